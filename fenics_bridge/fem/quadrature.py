@@ -149,6 +149,14 @@ class QuadraturePoints:
         strain = ", ".join(f"{e:.6g}" for e in self._trial_strain[point])
         return f"the law {law.name} failed at ({position}) m for the strain increment ({strain})"
 
+    def wave_moduli(self, laws: Sequence[Law]) -> NDArray[np.float64]:
+        """Moduli of compression and shear waves of the last equilibrium (n, 2) [Pa]; 0 in inactive cells."""
+        moduli = np.zeros((self.n, 2))
+        for law, piece in zip(laws, self._pieces):
+            state = np.ascontiguousarray(self.state[piece, : law.n_state])
+            moduli[piece] = law.wave_moduli(self.stress[piece], state)
+        return moduli
+
     def add_viscosity(self, laws: Sequence[Law], factor: float, strain_increment: NDArray[np.float64]) -> Any:
         """Add a factor times the elastic stiffness to the tangent; returns that times the strain increment: (n, S) [Pa].
 

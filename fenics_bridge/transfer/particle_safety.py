@@ -180,8 +180,8 @@ def _scales(model: mpm.Model) -> tuple[float, float]:
     low = np.min(comm.allgather(p.position.min(axis=0, initial=np.inf)), axis=0)
     high = np.max(comm.allgather(p.position.max(axis=0, initial=-np.inf)), axis=0)
     density = comm.allreduce(float((p.mass / p.volume).max(initial=0.0)), MPI.MAX)
-    shear = min(law.shear_modulus for law in model.laws)
-    wave = min(law.p_wave_modulus for law in model.laws)
+    softest = model.wave_moduli().min(axis=0, initial=np.inf)
+    wave, shear = (comm.allreduce(float(modulus), MPI.MIN) for modulus in softest)
     gravity = float(np.linalg.norm(model.gravity))
     return (
         float(np.linalg.norm(high - low)) * math.sqrt(density / shear),

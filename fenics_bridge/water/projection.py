@@ -57,8 +57,8 @@ class PressureProjection:
         longest = np.sum((corners[:, :, None] - corners[:, None]) ** 2, axis=3).max(axis=(1, 2))
         from_centroid = corners - corners.mean(axis=1, keepdims=True)
         moments = np.einsum("cki,ckj->cij", from_centroid, from_centroid) / ((dim + 1) * (dim + 2))
-        self._stiffness, storage, mobility, density = (np.zeros(n) for _ in range(4))
-        self._stiffness[points.cells] = np.array([_resisting(law) for law in laws])[points.material]
+        storage, mobility, density = (np.zeros(n) for _ in range(3))
+        self._points, self._laws = points, laws
         for soil, own in zip(soils, cells):
             own = own[own < n]
             storage[own], density[own] = soil.porosity / modulus, soil.density or 0.0
@@ -76,17 +76,20 @@ class PressureProjection:
             beta: Newmark's parameter of steps with inertia. The mass of a cell then resists as stiffness does, rho h^2 / (12 beta
                 dt^2) for displacements that alternate from node to node; without it waves would be too slow.
         """
-        stiffness = self._stiffness + (0.0 if beta is None else self._mass / (beta * dt**2))
+        stiffness = self._resisting() + (0.0 if beta is None else self._mass / (beta * dt**2))
         undrained = 1.5 * (1 / stiffness + self._storage)
         values = np.maximum(0.0, undrained - self._per_second * dt)[:, None] * self._moments
         rows = compat.cell_dofs(function.function_space)[: len(values), 0]
         function.x.array.reshape(-1, values.shape[1])[rows] = values
         function.x.scatter_forward()
 
-
-def _resisting(law: Law) -> float:
-    """Modulus [Pa] with which soil resists displacements that alternate from node to node."""
-    return min(law.p_wave_modulus, 3 * law.shear_modulus)
+    def _resisting(self) -> NDArray[np.float64]:
+        """Modulus [Pa] with which each cell resists displacements that alternate from node to node; infinite without soil."""
+        p_wave, shear = self._points.wave_moduli(self._laws).T
+        of_points = np.minimum(p_wave, 3 * shear).reshape(-1, self._points.per_cell)
+        modulus = np.full(len(self._storage), np.inf)
+        modulus[self._points.cells] = np.where(of_points.all(axis=1), of_points.mean(axis=1), np.inf)
+        return modulus
 
 
 def _slenderness(corners: NDArray[np.float64], longest: NDArray[np.float64]) -> NDArray[np.float64]:

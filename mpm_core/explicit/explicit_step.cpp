@@ -10,6 +10,7 @@
 #include "model/field_contacts.h"
 #include "model/integration.h"
 #include "model/mapping.h"
+#include "model/material_points.h"
 #include "model/reproducible.h"
 #include "model/resting_nodes.h"
 
@@ -316,9 +317,13 @@ CriticalParticle critical_particle(const Model<G>& model)
     for (const Run& run : points.runs)
     {
       const double h = smallest_altitude<D>(model.mesh.shapes[run.cell]);
-      const double modulus = p_wave_modulus(points.laws[run.material]);
+      const Law& law = points.laws[static_cast<std::size_t>(run.material)];
+      const bool differs = has_moduli_of_points(law);
+      double modulus = p_wave_modulus(law);
       for (Index p = run.first; p < run.last; ++p)
       {
+        if (differs)
+          modulus = limiting_modulus_of_particle(law, points.particles, p);
         const double squared = h * h / wave_squared(model, p, modulus);
         if (squared < found.squared_time)
           found = {p, h, squared};

@@ -4,6 +4,7 @@
 #include "contact/touch.h"
 #include "implicit/driven_bodies.h"
 #include "model/contacts.h"
+#include "model/material_points.h"
 #include "transfer/affine_field.h"
 
 namespace mpm::implicit
@@ -27,8 +28,8 @@ void find_touching(const Model<G>& model, SeenSurface<D> seen, const std::vector
 {
   const auto nodal = [velocity](Index i) -> const Vector<D>& { return velocity[static_cast<std::size_t>(i)]; };
   const AffineField<D> field = affine_field<D>(model.mesh, run.cell, nodal);
-  const Law& law = model.laws[static_cast<std::size_t>(run.material)];
-  const ContactModuli moduli{p_wave_modulus(law), shear_modulus(law)};
+  const WaveModuli of_soil = mean_moduli(material_points(model), run);
+  const ContactModuli moduli{of_soil.p_wave, of_soil.shear};
   for (Index p = run.first; p < run.last; ++p)
   {
     if (bonds && !is_tied(*bonds, p))

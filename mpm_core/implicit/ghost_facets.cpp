@@ -20,7 +20,7 @@ std::vector<CellContents> cell_contents(const Mesh<D>& mesh, const MaterialPoint
   std::vector<CellContents> contents(mesh.cells.size(), CellContents{});
   for (const Run& run : points.runs)
   {
-    const double shear = shear_modulus(points.laws[run.material]);
+    const double shear = mean_moduli(points, run).shear;
     for (Index p = run.first; p < run.last; ++p)
     {
       contents[run.cell].volume += points.particles.volume[p];

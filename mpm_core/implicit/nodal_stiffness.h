@@ -6,8 +6,7 @@
 
 namespace mpm::implicit
 {
-/// sum_p V_p M |grad N_i|^2 of each node for a modulus M of the laws [Pa]; this rank's part [N/m].
+/// sum_p V_p M |grad N_i|^2 of each node for a modulus M of the points [Pa]; this rank's part [N/m].
 template <int D>
-std::vector<double> nodal_stiffness(const Mesh<D>& mesh, const MaterialPoints<D>& points,
-                                    double (*modulus)(const Law&));
+std::vector<double> nodal_stiffness(const Mesh<D>& mesh, const MaterialPoints<D>& points, double WaveModuli::*modulus);
 } // namespace mpm::implicit

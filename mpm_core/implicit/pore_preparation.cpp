@@ -4,6 +4,7 @@
 #include "implicit/pore_water.h"
 #include "model/anisotropy.h"
 #include "model/integration.h"
+#include "model/material_points.h"
 #include "transfer/resting.h"
 
 #include <algorithm>
@@ -165,12 +166,17 @@ std::vector<NodalWater> sum_particles(const Model<G>& model, ImplicitStep<G>& st
     const auto standing = standing_water(mesh, *model.water, run.cell);
     const auto anisotropy = anisotropy_of<D>(*model.water, run.material);
     const double per_density = inertia_per_density(longest_edge_squared(mesh.points, mesh.cells[run.cell]), step);
-    const double compressed = p_wave_modulus(law);
-    const Resistance soil{compressed, std::min(compressed, 3 * shear_modulus(law)), per_density};
+    const bool differs = has_moduli_of_points(law);
+    WaveModuli moduli{p_wave_modulus(law), shear_modulus(law)};
     for (Index p = run.first; p < run.last; ++p)
+    {
+      if (differs)
+        moduli = moduli_of_particle(law, model.particles, p);
+      const Resistance soil{moduli.p_wave, std::min(moduli.p_wave, 3 * moduli.shear), per_density};
       add_particle<G>(mesh, model.particles, *model.water, run, p, soil, factor, standing, anisotropy,
                       field.moments[run.cell], step.pore.cells[run.cell], sums[static_cast<std::size_t>(run.cell)],
                       nodes);
+    }
   }
   for (Index c : step.cells)
   {

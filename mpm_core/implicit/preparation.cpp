@@ -49,11 +49,11 @@ template <class G>
 void find_frequencies(const Mesh<G::dim>& mesh, NodeExchange& exchange, const MaterialPoints<G::dim>& points,
                       const VelocityField<G>& field, ImplicitStep<G>& step)
 {
-  step.elastic = nodal_stiffness(mesh, points, [](const Law& law) { return p_wave_modulus(law); });
+  step.elastic = nodal_stiffness(mesh, points, &WaveModuli::p_wave);
   step.frequency.assign(field.nodes.size(), 0.0);
   if (step.options.damping == 0)
     return;
-  auto stiffness = nodal_stiffness(mesh, points, [](const Law& law) { return shear_modulus(law); });
+  auto stiffness = nodal_stiffness(mesh, points, &WaveModuli::shear);
   sum_shared(exchange, stiffness.data(), 1);
   step.frequency = shear_frequencies<G::dim>(stiffness, field.nodes);
 }

@@ -2,10 +2,12 @@
 
 #include "base/eigen.h"
 #include "model/mapping.h"
+#include "model/material_points.h"
 #include "parallel/agreement.h"
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
 namespace mpm::model
@@ -22,25 +24,25 @@ struct NodeOfSide
   double is_rigid; ///< above zero where it is
 };
 
-/// Number of the law of the soil in each owned cell; `none` in empty ones.
-template <class G>
-std::vector<Index> law_of_cell(const Model<G>& model)
+/// Moduli of the soil in each owned cell, where there is some
+template <class G, int D = G::dim>
+std::vector<std::optional<WaveModuli>> moduli_of_cells(const Model<G>& model)
 {
-  std::vector<Index> laws(static_cast<std::size_t>(model.mesh.owned_cells), none);
-  for (const std::span<const Run> runs : {std::span(model.order.runs), std::span(model.fields.front().resting.runs)})
-    for (const Run& run : runs)
-      laws[static_cast<std::size_t>(run.cell)] = run.material;
-  return laws;
+  std::vector<std::optional<WaveModuli>> moduli(static_cast<std::size_t>(model.mesh.owned_cells));
+  for (const MaterialPoints<D>& points : {material_points(model), resting_points(model)})
+    for (const Run& run : points.runs)
+      moduli[static_cast<std::size_t>(run.cell)] = mean_moduli(points, run);
+  return moduli;
 }
 
 /// Adds the facet of a cell opposite to vertex k: its vertices have equal parts of its area.
 template <int D>
-void add_facet(const Mesh<D>& mesh, const AbsorbingSide& side, Index cell, int k, double density, const Law& law,
-               std::vector<NodeOfSide<D>>& nodes)
+void add_facet(const Mesh<D>& mesh, const AbsorbingSide& side, Index cell, int k, double density,
+               const WaveModuli& of_soil, std::vector<NodeOfSide<D>>& nodes)
 {
   const CellShape<D>& shape = mesh.shapes[cell];
   const double size = norm<D>(shape.gradient[k]), area = size * shape.volume; // D V |grad N_k| over D vertices
-  const double moduli[]{p_wave_modulus(law), shear_modulus(law)};
+  const double moduli[]{of_soil.p_wave, of_soil.shear};
   const double given[]{side.normal_impedance, side.shear_impedance};
   const bool is_rigid = std::isinf(side.normal_impedance);
   std::array<double, 2> damping{}, stiffness{};
@@ -66,18 +68,18 @@ void add_facet(const Mesh<D>& mesh, const AbsorbingSide& side, Index cell, int k
 
 /// @returns number of facets of soil on the side, of this rank
 template <class G, int D = G::dim>
-int add_side(const Model<G>& model, const AbsorbingSide& side, std::span<const Index> laws,
+int add_side(const Model<G>& model, const AbsorbingSide& side, std::span<const std::optional<WaveModuli>> moduli,
              std::vector<NodeOfSide<D>>& nodes)
 {
   int facets = 0;
   const auto& moments = model.fields.front().moments;
   for (Index c = 0; c < model.mesh.owned_cells; ++c)
     for (int k = 0; k <= D; ++k)
-      if (const Index law = laws[static_cast<std::size_t>(c)];
-          law != none && model.mesh.facet_tags[c][k] == side.facet_tag)
+      if (const auto& of_soil = moduli[static_cast<std::size_t>(c)];
+          of_soil && model.mesh.facet_tags[c][k] == side.facet_tag)
       {
         const double density = moments[c].mass / moments[c].volume;
-        add_facet<D>(model.mesh, side, c, k, density, model.laws[static_cast<std::size_t>(law)], nodes);
+        add_facet<D>(model.mesh, side, c, k, density, *of_soil, nodes);
         ++facets;
       }
   return facets;
@@ -87,14 +89,15 @@ int add_side(const Model<G>& model, const AbsorbingSide& side, std::span<const I
 /// @throws InputError on all ranks: a side without soil
 /// @note Collective
 template <class G, int D = G::dim>
-void add_entries(Model<G>& model, std::span<const AbsorbingSide> sides, Index free_field, std::span<const Index> laws)
+void add_entries(Model<G>& model, std::span<const AbsorbingSide> sides, Index free_field,
+                 std::span<const std::optional<WaveModuli>> moduli)
 {
   std::vector<NodeOfSide<D>> nodes(model.mesh.points.size(), NodeOfSide<D>{});
   for (const AbsorbingSide& side : sides)
   {
     if (side.free_field != free_field)
       continue;
-    int facets = add_side<G>(model, side, laws, nodes);
+    int facets = add_side<G>(model, side, moduli, nodes);
     MPI_Allreduce(MPI_IN_PLACE, &facets, 1, MPI_INT, MPI_SUM, model.exchange.comm);
     if (facets == 0)
       throw InputError("facet_tag " + std::to_string(side.facet_tag) +
@@ -200,13 +203,13 @@ void set_absorbing_sides(Model<G>& model, std::span<const AbsorbingSide> sides, 
         "or three dimensions and one field");
   prepare(model);
   map_to_nodes(model);
-  const std::vector<Index> laws = law_of_cell(model);
+  const std::vector<std::optional<WaveModuli>> moduli = moduli_of_cells(model);
   std::set<Index> free_fields;
   for (const AbsorbingSide& side : sides)
     free_fields.insert(side.free_field);
   field.dashpots.clear();
   for (Index free_field : free_fields)
-    add_entries<G>(model, sides, free_field, laws);
+    add_entries<G>(model, sides, free_field, moduli);
   std::ranges::stable_sort(field.dashpots, {}, &DashpotNode<D>::node);
   for_each_node<D>(field.dashpots,
                    [&](std::span<DashpotNode<D>> entries)

@@ -2,7 +2,10 @@
 /// @file
 /// The particles as steps read them, in runs by cells, with the laws that they follow.
 
+#include "materials/laws/point_moduli.h"
 #include "model/model.h"
+
+#include <array>
 
 namespace mpm::model
 {
@@ -26,5 +29,51 @@ template <class G, int D = G::dim>
 MaterialPoints<D> resting_points(const Model<G>& model)
 {
   return {model.particles, model.fields.front().resting.runs, model.laws};
+}
+
+/// Calls f(mean stress, state) with those of a particle.
+template <int D, class F>
+auto with_stress_and_state(const Law& law, const Particles<D>& particles, Index p, F&& f)
+{
+  std::array<double, max_states> state;
+  const auto n = static_cast<std::size_t>(n_state(law));
+  for (std::size_t k = 0; k < n; ++k)
+    state[k] = particles.state[k][p];
+  return f((particles.stress[0][p] + particles.stress[1][p] + particles.stress[2][p]) / 3, std::span(state.data(), n));
+}
+
+/// Moduli of a particle as it is now [Pa]
+template <int D>
+WaveModuli moduli_of_particle(const Law& law, const Particles<D>& particles, Index p)
+{
+  return with_stress_and_state(law, particles, p,
+                               [&](double mean_stress, std::span<const double> state)
+                               { return moduli_of_point(law, mean_stress, state); });
+}
+
+/// Modulus from which the time step of a particle follows [Pa]
+template <int D>
+double limiting_modulus_of_particle(const Law& law, const Particles<D>& particles, Index p)
+{
+  return with_stress_and_state(law, particles, p,
+                               [&](double, std::span<const double> state) { return limiting_modulus(law, state); });
+}
+
+/// Means of the moduli of the points of a run, by their volumes [Pa]
+template <int D>
+WaveModuli mean_moduli(const MaterialPoints<D>& points, const Run& run)
+{
+  const Law& law = points.laws[static_cast<std::size_t>(run.material)];
+  if (!has_moduli_of_points(law))
+    return {p_wave_modulus(law), shear_modulus(law)};
+  double volume = 0, p_wave = 0, shear = 0;
+  for (Index p = run.first; p < run.last; ++p)
+  {
+    const WaveModuli moduli = moduli_of_particle(law, points.particles, p);
+    volume += points.particles.volume[p];
+    p_wave += points.particles.volume[p] * moduli.p_wave;
+    shear += points.particles.volume[p] * moduli.shear;
+  }
+  return {p_wave / volume, shear / volume};
 }
 } // namespace mpm::model

@@ -19,11 +19,12 @@ namespace
 {
 /// beta times the rate of elastic stress of a cell, by the velocities at the start.
 template <class G, int D = G::dim>
-Working<G> viscous_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell, const Law& law, double beta)
+Working<G> viscous_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell, const WaveModuli& moduli,
+                          double beta)
 {
   const auto start = [&](Index i) -> const Vector<D>& { return field.start_velocity[i]; };
   const AffineField<D> velocity = affine_field<D>(mesh, cell, start);
-  const double mu = beta * shear_modulus(law), lambda = beta * p_wave_modulus(law) - 2 * mu;
+  const double mu = beta * moduli.shear, lambda = beta * moduli.p_wave - 2 * mu;
   double hoop = 0, trace = 0;
   if constexpr (G::has_hoop)
     hoop = velocity.value[0] / mesh.shapes[cell].centre[0];
@@ -62,8 +63,7 @@ void add_run(const Mesh<D>& mesh, const MaterialPoints<D>& points, const Run& ru
       rayleigh.stiffness > 0 && std::ranges::none_of(nodes, [&](Index i) { return is_light(field, i); });
   Working<G> stress{};
   if (is_strained)
-    stress = viscous_stress<G>(mesh, field, run.cell, points.laws[static_cast<std::size_t>(run.material)],
-                               rayleigh.stiffness * volume);
+    stress = viscous_stress<G>(mesh, field, run.cell, mean_moduli(points, run), rayleigh.stiffness * volume);
   for (int k = 0; k <= D; ++k)
   {
     const Vector<D> viscous = internal_force<G>(stress, shape, k), &velocity = field.start_velocity[nodes[k]];

@@ -2,7 +2,7 @@
 /// @file
 /// Laws on NumPy arrays: one row per point.
 
-#include "materials/laws/law.h"
+#include "materials/laws/point_moduli.h"
 #include "python/arrays.h"
 #include "python/law_arguments.h"
 
@@ -129,6 +129,27 @@ BatchReport update_arrays(const L& law, const py::array& strain_increment, py::a
                     : update_rows<3>(law, rows, static_cast<Index>(n));
 }
 
+template <class L>
+py::array_t<double> wave_moduli(const L& law, const py::array& stress, const py::array& state)
+{
+  const py::ssize_t width = stress.ndim() == 2 && stress.shape(1) == 6 ? 6 : 4, n = stress.ndim() ? stress.shape(0) : 0;
+  check_array<double>("stress", stress, {n, width});
+  check_array<double>("state", state, {n, n_state(law)});
+  const Law any = law;
+  const double* of_point = values<double>(stress).data();
+  auto states = values<double>(state);
+  py::array_t<double> moduli({n, py::ssize_t{2}});
+  for (py::ssize_t row = 0; row < n; ++row, of_point += width)
+  {
+    const auto count = static_cast<std::size_t>(n_state(law));
+    const WaveModuli here = moduli_of_point(any, (of_point[0] + of_point[1] + of_point[2]) / 3, states.first(count));
+    states = states.subspan(count);
+    moduli.mutable_at(row, 0) = here.p_wave;
+    moduli.mutable_at(row, 1) = here.shear;
+  }
+  return moduli;
+}
+
 inline constexpr const char* update_text =
     R"(Update points by a strain increment, in place; all arrays float64, row by row.
 
@@ -177,6 +198,10 @@ py::class_<L> bind_law(py::module_& m, const std::string& name, const std::strin
       .def_property_readonly(
           "shear_modulus", [](const L& law) { return shear_modulus(law); },
           "Shear modulus G [Pa]; an estimate of its size where it changes or is not known")
+      .def("wave_moduli", &wave_moduli<L>, py::arg("stress"), py::arg("state"),
+           "Moduli of compression and shear waves of points as they are now (n, 2) [Pa]; they differ from those of the "
+           "law's numbers in `CamClay`, by the pressure, and in `Heterogeneous`. Stress (n, S) [Pa], state (n, "
+           "n_state).")
       .def_property_readonly(
           "needs_cell_size", [](const L& law) { return needs(law).cell_size; },
           "Whether what the law does depends on the size of a point's cell")

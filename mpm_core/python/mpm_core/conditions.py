@@ -101,7 +101,10 @@ class Conditions:
         return np.array(self._core.gravity)
 
     def set_gravity(self, gravity: ArrayLike, ramp: float = 0.0) -> None:
-        """Set gravity [m/s2], shape (D,); it rises linearly from zero over the first ``ramp`` seconds."""
+        """Set gravity [m/s2], shape (D,).
+
+        With a ramp [s] it rises linearly from zero between the times 0 and ``ramp`` of the model, whenever it is set.
+        """
         components = floats("gravity", gravity, (self.mesh.dim,)).tolist()
         self._core.gravity_ramp = positive("ramp", ramp, "s", zero=True)
         self._core.gravity = components

@@ -97,17 +97,18 @@ class GroundColumn:
         self._thickness, self._density = np.diff(self.heights), np.array(layers.density)
         self.stress, self._state = np.array(layers.stress), np.array(layers.state).reshape(n, -1)
         self._stress_start = self.stress.copy()
-        p_wave, shear = (
-            np.array([getattr(laws[k], name) for k in self._law]) for name in ("p_wave_modulus", "shear_modulus")
-        )
+        self._pieces = [(law, np.flatnonzero(self._law == k)) for k, law in enumerate(laws)]
+        p_wave, shear = np.empty((2, n))
+        for law, rows in self._pieces:
+            p_wave[rows], shear[rows] = law.wave_moduli(self.stress[rows], self._state_of(law, rows)).T
         self._moduli = np.column_stack([shear] * (dim - 1) + [p_wave])  # (n, D), across and along the column
         self._lame = p_wave - 2 * shear
         self._mass = self._density * self._thickness
         self._coupled = (self._mass * layers.coupled_mass)[:, None]
         self._own = 0.5 * self._mass[:, None] - self._coupled
         self._nodal_mass = self._to_levels(0.5 * self._mass, 0.5 * self._mass)
-        self._pieces = [(law, np.flatnonzero(self._law == k)) for k, law in enumerate(laws)]
-        critical = float((self._thickness * np.sqrt(self._density / p_wave)).min())
+        highest = np.maximum(p_wave, [laws[k].p_wave_modulus for k in self._law])  # as it may become
+        critical = float((self._thickness * np.sqrt(self._density / highest)).min())
         self.dt = COURANT * rayleigh.time_step(critical)
         """Length of a step [s]"""
         self.velocity, self._displacement = np.zeros((n + 1, dim)), np.zeros(dim)
@@ -136,6 +137,10 @@ class GroundColumn:
         self._rows = rows[-2:]
         times, velocities, tractions = zip(*rows)
         return np.array(times), np.array(velocities), np.array(tractions)
+
+    def _state_of(self, law: Any, rows: NDArray[np.intp]) -> Floats:
+        """State variables of layers of a law, (m, n_state)."""
+        return np.ascontiguousarray(self._state[rows, : law.n_state])
 
     def _to_levels(self, lower: Floats, upper: Floats) -> Floats:
         """Contributions of the layers to the levels below and above them."""
@@ -204,7 +209,7 @@ class GroundColumn:
         for law, rows in self._pieces:
             if len(rows) == 0:
                 continue
-            stress, state = self.stress[rows], np.ascontiguousarray(self._state[rows, : law.n_state])
+            stress, state = self.stress[rows], self._state_of(law, rows)
             report = law.update(
                 increment[rows], stress, state, time=self.time, dt=self.dt, cell_size=self._cell_size[rows]
             )

@@ -132,6 +132,14 @@ class ParticleValues:
             raise InputError(f"name is '{name}', expected a state variable of the laws: {', '.join(known)}")
         return columns
 
+    def wave_moduli(self) -> NDArray[np.float64]:
+        """Moduli of compression and shear waves in this rank's particles as they are now [Pa], shape (n, 2)."""
+        p, moduli = self.particles, np.empty((len(self.particles), 2))
+        for number, law in enumerate(self.laws):
+            rows = np.flatnonzero(p.material == number)
+            moduli[rows] = law.wave_moduli(p.stress[rows], np.ascontiguousarray(p.state[rows, : law.n_state]))
+        return moduli
+
     def assign(self, material: ArrayLike) -> None:
         """Give each particle its law: numbers of laws, shape (n,), in the order of ``particles``. Not collective.
 

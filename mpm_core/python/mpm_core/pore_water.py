@@ -49,6 +49,7 @@ class PoreWater(Conditions):
 
     laws: list[Any]
     particles: Particles
+    wave_moduli: Any
     _water_conditions: list[WaterCondition]
     _retention: list[list[NDArray[np.float64]]]
 
@@ -144,7 +145,7 @@ class PoreWater(Conditions):
         density, of_water = p.mass / volume, n * water.unit_weight / STANDARD_GRAVITY
         if self._core.has_two_phases:
             density = density + p.water_mass / volume
-        modulus = np.array([law.p_wave_modulus for law in self.laws])[p.material] if len(p) else np.empty(0)
+        modulus = self.wave_moduli()[:, 0]
         undrained = (modulus + water.modulus / n) / density
         fast = [
             _core.fast_wave_squared(e, water.modulus, pores, rho - wet, wet)

@@ -1,0 +1,106 @@
+#include "materials/laws/point_moduli.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mpm::materials
+{
+namespace
+{
+WaveModuli moduli_of_bulk(double bulk, double poisson)
+{
+  return {3 * bulk * (1 - poisson) / (1 + poisson), 3 * bulk * (1 - 2 * poisson) / (2 * (1 + poisson))};
+}
+
+/// K of Cam-Clay over its pressure [-]: v / kappa
+double bulk_per_pressure(const CamClay& law, double log_volume)
+{
+  return (1 + law.void_ratio) * std::exp(log_volume) / law.swelling;
+}
+
+LawList<> own_law(const Heterogeneous& law, std::span<const double> state)
+{
+  const auto first = state.begin() + n_state(law.law);
+  return law_of_point(law, {first, first + static_cast<std::ptrdiff_t>(law.varying.size())});
+}
+
+struct DiffersByPoint
+{
+  template <class L>
+  bool operator()(const L&) const
+  {
+    return false;
+  }
+  bool operator()(const CamClay&) const { return true; }
+  bool operator()(const Heterogeneous&) const { return true; }
+  bool operator()(const Hencky& law) const { return std::visit(*this, law.law); }
+  bool operator()(const Undrained& law) const { return std::visit(*this, law.skeleton); }
+};
+
+struct ModuliOfPoint
+{
+  double mean_stress;
+  std::span<const double> state;
+
+  template <class L>
+  WaveModuli operator()(const L& law) const
+  {
+    return {p_wave_modulus(law), shear_modulus(law)};
+  }
+  WaveModuli operator()(const CamClay& law) const
+  {
+    const double least = 1e-6 * (law.preconsolidation + law.attraction); // a point without pressure has no stiffness
+    const double pressure = std::max(law.attraction - mean_stress, least);
+    return moduli_of_bulk(bulk_per_pressure(law, state[2]) * pressure, law.poisson);
+  }
+  WaveModuli operator()(const Heterogeneous& law) const { return std::visit(*this, own_law(law, state)); }
+  WaveModuli operator()(const Hencky& law) const
+  {
+    const double ratio = std::exp(state[static_cast<std::size_t>(n_state(law.law))]); // of volumes, J
+    return std::visit(ModuliOfPoint{ratio * mean_stress, state}, law.law);
+  }
+  WaveModuli operator()(const Undrained& law) const
+  {
+    const double excess = state[static_cast<std::size_t>(n_state(law.skeleton))];
+    WaveModuli moduli = std::visit(ModuliOfPoint{mean_stress + excess, state}, law.skeleton);
+    moduli.p_wave += law.water_modulus / law.porosity;
+    return moduli;
+  }
+};
+
+struct LimitingModulus
+{
+  std::span<const double> state;
+
+  template <class L>
+  double operator()(const L& law) const
+  {
+    return p_wave_modulus(law);
+  }
+  double operator()(const CamClay& law) const
+  {
+    const double preconsolidation = (law.preconsolidation + law.attraction) * std::exp(state[1]);
+    return moduli_of_bulk(bulk_per_pressure(law, state[2]) * (2 * preconsolidation - law.attraction), law.poisson)
+        .p_wave;
+  }
+  double operator()(const Heterogeneous& law) const { return std::visit(*this, law.law); }
+  double operator()(const Hencky& law) const { return std::visit(*this, law.law); }
+  double operator()(const Undrained& law) const
+  {
+    return std::visit(*this, law.skeleton) + law.water_modulus / law.porosity;
+  }
+};
+} // namespace
+
+bool has_moduli_of_points(const Law& law) { return std::visit(DiffersByPoint{}, law); }
+
+WaveModuli moduli_of_point(const Law& law, double mean_stress, std::span<const double> state)
+{
+  return std::visit(ModuliOfPoint{mean_stress, state}, law);
+}
+
+double limiting_modulus(const Law& law, std::span<const double> state)
+{
+  return std::visit(LimitingModulus{state}, law);
+}
+} // namespace mpm::materials
