@@ -17,6 +17,7 @@ import numpy as np
 from common import body_runs
 from common.body_runs import BodyRun, follow, mean_force
 from common.checkpoint import check_restart
+from common.checks import check_cells, check_whole
 from common.figures import Pictures, curve_figure
 from common.flow_impact import bore
 from common.history import History
@@ -53,7 +54,7 @@ def parser() -> ArgumentParser:
     """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_number(p, "--depth", 0.5, "m", "depth of the flow", above=0)
-    add_number(p, "--length", 14.0, "-", "ratio of the flow's length to its depth", at_least=4)
+    add_number(p, "--length", 14.0, "-", "ratio of the flow's length to its depth, rounded to whole cells", at_least=4)
     add_number(
         p, "--froude", 2.0, "-", "Froude number, the ratio of the flow's velocity to that of shallow waves", at_least=1
     )
@@ -71,7 +72,7 @@ def parser() -> ArgumentParser:
         "--cell-size",
         0.125,
         "-",
-        "ratio of the side of the squares (two triangles each) to the depth of the flow",
+        "ratio of the side of the squares (two triangles each) to the depth of the flow, 1 over a whole number",
         above=0,
         at_most=0.5,
     )
@@ -87,6 +88,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check(p, a.length > 2 / np.tan(np.radians(a.front_angle)),
           lambda: f"--length is {a.length:g}, expected more than twice the front's, "
           f"{1 / np.tan(np.radians(a.front_angle)):.3g}")  # fmt: skip
+    check_whole(p, 1 / a.cell_size, f"--cell-size is {a.cell_size:g}, expected 1 over a whole number, such as 0.125")
+    check_cells(p, a, 6 * a.length * (1 + a.froude) / a.cell_size**2, "--cell-size", "--length", "--froude")
     check_restart(p, a, body_runs.MAY_CHANGE)
     return a
 
@@ -200,7 +203,8 @@ def draw_force(path: Path, a: Namespace, history: History) -> None:
 def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> Pictures:
     """The force, sand and wall in the end, and a film."""
     title = f"$t$ = {result.history['time_s'][-1]:.2f} s"
-    pictures = body_runs.body_pictures(a, scene, result, folder, title)
+    labels = "along the plane [m]", "normal to the plane [m]"
+    pictures = body_runs.body_pictures(a, scene, result, folder, title, labels=labels)
     return {"force": lambda: draw_force(folder / "force.png", a, result.history), **pictures} if pictures else {}
 
 

@@ -16,7 +16,7 @@ from common.figures import Pictures
 from common.options import check, study_parser
 from common.ranks import run_study
 from common.results import open_results
-from common.site_runs import add_site_option, site_study
+from common.site_runs import add_site_option, check_site_options, site_study
 from common.slope_fem import (
     add_fem_slope_options,
     add_ground_option,
@@ -55,6 +55,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check(p, options.friction_angle < options.angle,
           lambda: f"--friction-angle is {options.friction_angle:g}, expected below --angle, {options.angle:g} degrees: "
                   "a slope that is flatter carries any unit weight")  # fmt: skip
+    check_site_options(p, options, {"meshes", "elements", "equilibrium"})
     return options
 
 
@@ -73,7 +74,7 @@ def collapse(a: Namespace, cell_size: float, dilation_angle: float) -> bridge.Co
     """Raise the unit weight to the last equilibrium on one mesh; the first step does not depend on the result."""
     model = slope_fem(a, comm, cell_size, dilation_angle, a.depth)
     first_step = a.cohesion / a.height
-    title = f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees"
+    title = f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees, unit weight [N/m3]"
     return bridge.collapse_load(model, weight, first_step=first_step, progress=step_line(title))
 
 

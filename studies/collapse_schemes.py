@@ -16,6 +16,7 @@ from common.options import add_count, add_number, study_parser
 from common.page import Page
 from common.ranks import run_study
 from common.results import open_results
+from common.schemes import add_particles_per_cell
 from common.slope_case import GRAVITY, soil_of
 from common.slope_fem import add_fem_slope_options, check_fem_slope_options, mesh_sizes, slope_fem, step_line, weight
 from common.summary import write_summary
@@ -38,7 +39,7 @@ def parser() -> ArgumentParser:
     """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_fem_slope_options(p)
-    add_count(p, "--particles-per-cell", 1, "particles in each cell: 1, 3, 4, 6, 10, 12, ...")
+    add_particles_per_cell(p, 1)
     add_number(
         p,
         "--tolerance",
@@ -99,7 +100,7 @@ def runs(a: Namespace, cell_size: float, longest_step: float, end: float) -> dic
         found[name] = {"curve": curve, "collapse": curve[-1, 0], "cpu_seconds": process_time() - start}
         print(f"{name:20} h {cell_size:<7g} {curve[-1, 0] / 1e3:7.3f} kN/m3", flush=True)
     name, start = f"finite elements, {a.elements}", process_time()
-    progress = step_line(f"cells of {cell_size:g} m")
+    progress = step_line(f"cells of {cell_size:g} m, unit weight [N/m3]")
     fem = bridge.collapse_load(
         slope_fem(a, comm, cell_size), weight, longest_step, tolerance=a.tolerance, progress=progress
     )

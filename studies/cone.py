@@ -19,12 +19,14 @@ from time import perf_counter
 import numpy as np
 from common.body_runs import MAY_CHANGE, BodyRun, add_body_run_options, body_pictures, follow, mean_force, write_results
 from common.checkpoint import check_restart
+from common.checks import check_cells
 from common.cone_theory import lu, spherical_limit_pressure, teh_houlsby
 from common.figures import Pictures, curve_figure
 from common.history import History
 from common.movie import particle_movie
 from common.options import add_choice, add_number, check, study_parser
 from common.plots import CURVES, Scene
+from common.quiet import GATHERS, without_warning
 from common.ranks import run_study
 from common.results import ROOT, open_results
 from common.scenes import scene_of
@@ -79,6 +81,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
           f"{a.radius:g} m, at most")  # fmt: skip
     check(p, a.dilation_angle <= a.friction_angle, lambda: f"--dilation-angle is {a.dilation_angle:g} degrees, expected "
           f"--friction-angle, {a.friction_angle:g} degrees, at most")  # fmt: skip
+    inside = 2.5 * a.radius * (way(a) + 1.5 * a.radius) / (a.coarsening * a.cell_size) ** 2
+    check_cells(p, a, 2.3 * (inside + 12 * way(a) / a.cell_size), "--cell-size", "--radius", "--penetration")
     check_restart(p, a, MAY_CHANGE)
     return a
 
@@ -207,7 +211,9 @@ def draw_resistance(path: Path, a: Namespace, history: History) -> None:
 
 def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> Pictures:
     """The resistance, the soil and the cone in the end, and a film."""
-    pictures = body_pictures(a, scene, result, folder, f"depth {result.history['depth_m'][-1]:.3g} m")
+    depth = result.history["depth_m"][-1]
+    box = np.array([[0.0, -depth - 5 * a.radius], [5 * a.radius, 2 * a.radius]])  # beyond it nothing yields
+    pictures = body_pictures(a, scene, result, folder, f"depth {depth:.3g} m", box=box)
     return (
         {"resistance": lambda: draw_resistance(folder / "resistance.png", a, result.history), **pictures}
         if pictures
@@ -218,6 +224,7 @@ def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> P
 # --- 4. All together -------------------------------------------------------------------------------------------------
 
 
+@without_warning(GATHERS)
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     begin = perf_counter()
@@ -232,7 +239,7 @@ def main(arguments: list[str] | None = None) -> int:
         "depth_m": history["depth_m"][-1], "estimates": known,
     }  # fmt: skip
     others = ", ".join(f"{value:.2f} by {name}" for name, value in known.items())
-    change = "" if rise is None else f", {rise:+.1%} against the part of the way before"
+    change = "" if rise is None else f", {100 * rise:+.1f} % over the preceding section of the path"
     said = f"cone factor {factor:.2f}{change}; {others}"
     return write_results(
         a, model, result, folder, results, said, begin=begin,

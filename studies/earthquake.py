@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from common.animation import film_frames, save_animation
+from common.checks import check_cells, check_effect, check_file, check_whole
 from common.earthquake_plots import save_amplification, save_ground, save_motions, save_record
 from common.earthquake_site import (
     STEP,
@@ -30,7 +31,7 @@ from common.earthquake_site import (
 from common.figures import Pictures
 from common.followed import FollowedNodes, cells_near, mean_displacement, numbers_in
 from common.history import History
-from common.motions import ricker
+from common.motions import noise_band, ricker
 from common.movie import gathered, own_frame, particle_movie
 from common.newmark import sliding_block, yield_acceleration
 from common.options import add_choice, add_count, add_number, check, study_parser
@@ -41,6 +42,7 @@ from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
+from common.schemes import add_particles_per_cell
 from common.site_response import amplification, spectral_ratio
 from common.slope_case import GRAVITY, add_soil_options
 from common.summary import write_summary
@@ -69,7 +71,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--soil-depth", 5.0, "m", "depth below the toe at which the stiffer layer begins", above=0)
     add_number(p, "--stiff-depth", 10.0, "m", "thickness of the stiffer layer", above=0)
     add_number(p, "--cell-size", 1.0, "m", "side of the squares", above=0)
-    add_count(p, "--particles-per-cell", 10, "particles in each soil cell: 1, 3, 4, 6, 10, 12, ...")
+    add_particles_per_cell(p, 10)
     add_number(p, "--unit-weight", 19e3, "N/m3", "unit weight of the soil and of the stiffer layer", above=0)
     add_soil_options(p, dilation_angle=0.0)
     p.set_defaults(young=200e6, poisson=0.3, cohesion=25e3, friction_angle=20.0)
@@ -114,7 +116,38 @@ def parse(arguments: list[str] | None = None) -> Namespace:
         check(p, a.cell_size <= 0.5 * getattr(a, name),
               lambda name=name: f"--cell-size is {a.cell_size:g} m, "
                                 f"expected at most half of --{name.replace('_', '-')}")  # fmt: skip
+        check_whole(p, getattr(a, name) / a.cell_size, lambda name=name: f"--cell-size is {a.cell_size:g} m, expected "
+                    f"--{name.replace('_', '-')}, {getattr(a, name):g} m, over a whole number")  # fmt: skip
+    depth = a.height + a.soil_depth + a.stiff_depth
+    length = 2 * a.level + a.height / np.tan(np.radians(a.angle))
+    check_cells(
+        p,
+        a,
+        4 * length * depth / a.cell_size**2,
+        "--cell-size",
+        "--height",
+        "--level",
+        "--soil-depth",
+        "--stiff-depth",
+    )
+    check_motion(p, a)
     return a
+
+
+def check_motion(p: ArgumentParser, a: Namespace) -> None:
+    """End with an error where the options of the motion do not fit together."""
+    check_file(p, a.accelerogram, "--accelerogram")
+    synthetic = a.accelerogram is None
+    check_effect(p, a, not synthetic, ("--unit",), "--accelerogram")
+    check_effect(p, a, synthetic, ("--motion", "--peak", "--duration", "--seed"), "no --accelerogram")
+    check_effect(p, a, a.motion == "noise", ("--highest-frequency", "--seed"), "--motion noise")
+    band = 0.5 * a.frequency, a.highest_frequency
+    check(p, a.motion != "noise" or band[0] < band[1],
+          lambda: f"--highest-frequency is {band[1]:g} Hz, expected above the lowest frequency of the noise (half of "
+                  f"--frequency, {band[0]:g} Hz)")  # fmt: skip
+    check(p, a.motion != "noise" or not synthetic or noise_band(band, a.duration, STEP)[1].any(),
+          lambda: f"--duration is {a.duration:g} s, in which noise of steps of {STEP:g} s has no frequency from {band[0]:g} to "
+                  f"{band[1]:g} Hz; expected a longer one, or other values of --frequency and --highest-frequency")  # fmt: skip
 
 
 # --- 2. The earthquake -----------------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from common.options import add_choice, add_count, add_number, study_parser
 from common.ranks import run_study
 from common.results import open_results
 from common.slope_case import add_soil_options
-from common.soils import add_law_options, law_of
+from common.soils import add_law_options, check_law_options, law_of
 from common.summary import write_summary
 
 import mpm_core as mpm
@@ -120,6 +120,7 @@ def draw(history: History, a: Namespace, path: Path) -> None:
 def main(arguments: list[str] | None = None) -> int:
     p = parser()
     a = p.parse_args(arguments)
+    check_law_options(p, a)
     law = law_of(a)
     folder = open_results(a)
     test = mpm.ElementTest(law, [-a.pressure] * 3 + [0.0] * 3)

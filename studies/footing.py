@@ -11,6 +11,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from common.checks import check_cells
 from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
 from common.figures import Pictures
 from common.options import add_count, add_number, check, study_parser
@@ -65,6 +66,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
                   f"{options.friction_angle:g} degrees")  # fmt: skip
     check(p, options.cell_size <= options.half_width,
           lambda: f"--cell-size is {options.cell_size:g}, expected at most --half-width")  # fmt: skip
+    check_cells(p, options, 10 * (options.half_width / options.cell_size) ** 2, "--cell-size", "--half-width")
     return options
 
 
@@ -114,7 +116,7 @@ def footing(a: Namespace, cell_size: float, dilation_angle: float) -> tuple[brid
     domain, _, facet_tags = bridge.read_mesh(ROOT / "meshes" / "footing.geo", comm, parameters=parameters)
     supports = [bridge.roller(AXIS, (1, 0)), bridge.roller(FAR, (1, 0)), bridge.fixed(BASE)]
     model = bridge.QuasiStatic(domain, soil_of(a, dilation_angle), facet_tags, supports, **finite_elements(a))
-    show = step_line(f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees")
+    show = step_line(f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees, pressure [Pa]")
     curve, centre = [(0.0, 0.0)], np.zeros((1, 2))
 
     def look(step: bridge.LoadStep) -> None:

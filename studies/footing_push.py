@@ -17,6 +17,7 @@ from time import perf_counter
 import numpy as np
 from common.body_runs import MAY_CHANGE, BodyRun, add_body_run_options, body_pictures, follow, mean_force, write_results
 from common.checkpoint import check_restart
+from common.checks import check_cells
 from common.figures import Pictures, curve_figure
 from common.history import History
 from common.movie import particle_movie
@@ -78,6 +79,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
           f"{4 * a.half_width:g} m")  # fmt: skip
     check(p, 2 * a.cell_size <= a.half_width, lambda: f"--cell-size is {a.cell_size:g} m, expected half of --half-width, "
           f"{a.half_width:g} m, at most")  # fmt: skip
+    inside = 2.5 * a.half_width * (a.penetration + 1.5 * a.half_width) / (a.coarsening * a.cell_size) ** 2
+    check_cells(p, a, 2.3 * (inside + 12 * a.penetration / a.cell_size), "--cell-size", "--half-width", "--penetration")
     check_restart(p, a, MAY_CHANGE)
     return a
 
@@ -175,7 +178,9 @@ def draw_load(path: Path, a: Namespace, history: History) -> None:
 
 def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> Pictures:
     """The load, the soil and the footing in the end, and a film."""
-    pictures = body_pictures(a, scene, result, folder, f"settlement {result.history['settlement_m'][-1]:.3g} m")
+    settlement = result.history["settlement_m"][-1]
+    box = np.array([[0.0, -settlement - 2.5 * a.half_width], [4 * a.half_width, a.half_width]])
+    pictures = body_pictures(a, scene, result, folder, f"settlement {settlement:.3g} m", box=box)
     return {"load": lambda: draw_load(folder / "load.png", a, result.history), **pictures} if pictures else {}
 
 

@@ -1,4 +1,4 @@
-"""A slope of loose saturated sand loses its strength and runs out as a flow slide, until its pore water has left.
+"""A slope of loose saturated sand loses its strength and runs out as a flow slide.
 
 The slope is saturated up to its surface and rests under its weight. At the start the pore pressures of the loose sand rise by
 a fraction of the effective vertical stresses, as in an earthquake, and effective stresses decrease by the same amount. Soil
@@ -21,6 +21,7 @@ import numpy as np
 from common import body_runs
 from common.body_runs import BodyRun, follow
 from common.checkpoint import check_restart
+from common.checks import check_cells
 from common.figures import Pictures, save_figure
 from common.history import History
 from common.movie import QUANTITIES, WET_QUANTITIES, particle_movie
@@ -75,6 +76,17 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     a = p.parse_args(arguments)
     check(p, a.angle < a.friction_angle, lambda: f"--angle is {a.angle:g}, expected less than --friction-angle, "
           f"{a.friction_angle:g} degrees")  # fmt: skip
+    length = a.crest + a.height / np.tan(np.radians(a.angle)) + a.runout
+    check_cells(
+        p,
+        a,
+        2.3 * length * (a.height + a.cell_size) / a.cell_size**2,
+        "--cell-size",
+        "--height",
+        "--angle",
+        "--crest",
+        "--runout",
+    )
     check_restart(p, a, body_runs.MAY_CHANGE)
     return a
 
@@ -173,7 +185,7 @@ def draw_course(path: Path, history: History) -> None:
         above.plot(history["time_s"], history["runout_m"], color=CURVES[0], label="front, forwards")
         above.plot(history["time_s"], history["crest_settlement_m"], color=CURVES[2], label="crest, downwards")
         above.legend(fontsize=8)
-        above.set(ylabel="Way of the front,\nof the crest [m]", ylim=(0, None))
+        above.set(ylabel="Displacement of\nfront and crest [m]", ylim=(0, None))
         below.plot(history["time_s"], history["pressure_ratio"], color=CURVES[1])
         below.set(
             xlabel="Time [s]", ylabel="Mean pore pressure over\ntotal vertical stress [-]", xlim=(0, None), ylim=(0, 1)
@@ -192,8 +204,10 @@ def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> P
     frames = result.frames
     shown = {"start": frames[0], "slide": frames[len(frames) // 4], "end": frames[-1]}
     for key, quantity in WET_QUANTITIES.items():
-        limits = colour_limits(quantity, [frame[key] for frame in shown.values()])
         for name, frame in shown.items():
+            # Pore pressures in the end are small beside those that liquefy the sand.
+            compared = [frame] if name == "end" else [frames[0], shown["slide"]]
+            limits = colour_limits(quantity, [one[key] for one in compared])
             pictures[f"{key}_{name}"] = partial(
                 save_particles, folder / f"{key}_{name}.png", scene, frame["position"], frame["volume"], frame[key], quantity,
                 limits=limits, title=f"$t$ = {float(frame['time']):.3g} s",

@@ -1,6 +1,6 @@
-"""A slide runs out over terrain in three dimensions: over a valley given by formulas, or over a raster of heights.
+"""A slide runs out over terrain in three dimensions: over a valley given by formulas, or over a raster of elevations.
 
-Particles fill the body between the ground before the slide and the surface of rupture; friction acts between them and the
+Particles fill the body between the ground before the slide and the slip surface; friction acts between them and the
 remaining ground. Maps of the deposit, of the largest thickness and speed, and of the area that the slide has covered are
 written as ESRI ASCII grids or GeoTIFF and drawn over a hillshade.
 """
@@ -14,6 +14,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from common.checks import check_file
 from common.figures import Pictures
 from common.history import History
 from common.interrupt import Interrupt
@@ -44,13 +45,13 @@ def parser() -> ArgumentParser:
     """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     p.add_argument("--terrain", type=Path, default=None, metavar="FILE",
-                   help="heights of the ground before the slide: .asc, .tif, .xyz (default: a valley by formulas)")  # fmt: skip
+                   help="elevations of the ground before the slide: .asc, .tif, .xyz (default: a valley by formulas)")  # fmt: skip
     p.add_argument(
         "--rupture",
         type=Path,
         default=None,
         metavar="FILE",
-        help="heights of the surface of rupture, on which the slide begins",
+        help="elevations of the slip surface",
     )
     p.add_argument(
         "--crs",
@@ -86,6 +87,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
         (options.terrain is None) == (options.rupture is None),
         "--terrain and --rupture are both needed, or none of them",
     )
+    check_file(p, options.terrain, "--terrain")
+    check_file(p, options.rupture, "--rupture")
     check(p, options.spacing <= options.cell_size, lambda: f"--spacing is {options.spacing:g} m, expected --cell-size, "
           f"{options.cell_size:g} m, at most")  # fmt: skip
     return options
@@ -244,8 +247,9 @@ def main(arguments: list[str] | None = None) -> int:
     }  # fmt: skip
     pictures = write_maps(a, found, rupture, folder) if comm.rank == 0 else {}
     said = (
-        f"front {summary['front_m']:.1f} m from the centre, which fell {fall:.1f} m over {travel:.1f} m; fastest "
-        f"{summary['fastest_m_per_s']:.1f} m/s; {summary['particle_steps_per_second']:.3g} particle steps/s"
+        f"front {summary['front_m']:.1f} m from the initial centre of mass; the centre of mass fell {fall:.1f} m over "
+        f"{travel:.1f} m; fastest {summary['fastest_m_per_s']:.1f} m/s; {summary['particle_steps_per_second'] / 1e6:.1f} million "
+        "particle-steps per second"
     )
     return write_summary(folder, a, summary, comm, pictures=pictures if a.pictures else {}, said=said)
 

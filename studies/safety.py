@@ -18,7 +18,7 @@ from common.options import add_flag, add_number, check, study_parser
 from common.ranks import run_study
 from common.results import open_results
 from common.site_file import Site
-from common.site_runs import add_site_option, site_study
+from common.site_runs import add_site_option, check_site_options, site_study
 from common.slope_case import GRAVITY, SUPPORTS, soil_of
 from common.slope_fem import (
     add_fem_slope_options,
@@ -66,6 +66,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
           lambda: f"--unreduced names {', '.join(options.unreduced)}, expected --site: the slope has one soil")  # fmt: skip
     check(p, options.depth == 0 or not options.particles,
           lambda: f"--depth is {options.depth:g}, expected 0 with --particles, which stand on a rigid base")  # fmt: skip
+    check_site_options(p, options, {"unreduced", "start", "meshes", "elements", "equilibrium", "particles"})
     return options
 
 
@@ -83,7 +84,7 @@ def target(factor: float) -> Target:
 def safety(a: Namespace, cell_size: float, dilation_angle: float) -> bridge.Collapse:
     """Weaken the soil to the last equilibrium on one mesh."""
     model = slope_fem(a, comm, cell_size, dilation_angle, a.depth)
-    title = f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees"
+    title = f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees, factor"
     return bridge.factor_of_safety(model, weight(a.unit_weight), start=a.start, progress=step_line(title))
 
 
@@ -101,7 +102,7 @@ def slope_by_particles(a: Namespace) -> bridge.ParticleSafety:
         model.set_gravity((0.0, -GRAVITY))
         return model
 
-    return bridge.particle_safety(weakened, start=a.start, progress=step_line("particles"))
+    return bridge.particle_safety(weakened, start=a.start, progress=step_line("particles, factor"))
 
 
 def site_by_particles(a: Namespace, site: Site) -> bridge.ParticleSafety:
@@ -109,7 +110,7 @@ def site_by_particles(a: Namespace, site: Site) -> bridge.ParticleSafety:
     return bridge.particle_safety(
         lambda factor: site.particles(3, bridge.reduced_strength(site.laws, factor, site.tags_of(a.unreduced))),
         start=a.start,
-        progress=step_line("particles"),
+        progress=step_line("particles, factor"),
     )
 
 

@@ -2,11 +2,12 @@
 
 Finite elements (DOLFINx) give the elasto-plastic equilibrium of the soil body under its initial unit weight, and its stresses
 are transferred to particles. Then the unit weight is raised at once, and the slope slides until its geometry has changed enough
-to carry it. The slope is that of section 6 of the paper; its soil also has a viscosity, and forces in proportion to the
-momentum brake the slide, so that run-out and crest hardly depend on the size of the cells. Stresses are integrated over whole
-cells and strains averaged over nodes, since plain linear cells lock where soil fails without dilation; --paper repeats the
-published run instead, without viscosity and with local damping, zero initial stress and a time step of 1e-4 s. With --site a
-mesh of your own with its soils replaces the slope; it slides when the strength of all soils is divided by --factor.
+to carry it. The slope is that of section 6 of the paper (Fatemizadeh; see README, Source); its soil also has a viscosity, and
+forces in proportion to the momentum brake the slide, so that run-out and crest hardly depend on the size of the cells. Stresses
+are integrated over whole cells and strains averaged over nodes, since plain linear cells lock where soil fails without dilation;
+--paper repeats the published run instead, without viscosity and with local damping, zero initial stress and a time step of 1e-4
+s. With --site a mesh of your own with its soils replaces the slope; it slides when the strength of all soils is divided by
+--factor.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import Any
 
 from common.animation import film_frames, save_animation
 from common.checkpoint import Checkpoints, add_checkpoint_options, check_restart, numbered
+from common.checks import check_effect
 from common.ensemble import Ensemble, further_members
 from common.figures import Pictures
 from common.history import History
@@ -54,10 +56,10 @@ from common.schemes import (
     run_scheme,
     stable_integration,
 )
-from common.site_runs import add_site_option
+from common.site_runs import add_site_option, check_site_options
 from common.site_slides import add_strength_factor, site_slide
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, initialise
-from common.soils import law_of
+from common.soils import check_law_options, law_of
 from common.summary import write_summary
 from common.watch import Watch
 from mpi4py import MPI
@@ -76,6 +78,8 @@ MAY_CHANGE = {
     "frame-steps", "rebalance", "checkpoint-every", "fields", "float64", "compression", "pictures", "film",
 }  # fmt: skip
 """Options that a run may go on with from a checkpoint in another way: how it steps and what it writes, not what slides"""
+SITE_OPTIONS = {"factor", "particles-per-cell", "time", "frames", "damping", "pic", "nmd", "pictures", "film"}
+"""Options that the slide of a site has"""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -99,8 +103,8 @@ def parser() -> ArgumentParser:
     slide = p.add_argument_group("slide")
     add_damping(slide)
     add_switch(slide, "--nmd", None, "average volumetric strains over nodes, against locking (default: where the soil locks: "
-               "dilation angle below the friction angle, with implicit schemes 0; friction angle 0, undrained, Poisson's ratio above "
-               "0.45. Not with --paper, and for a site not for its dilation angles)")  # fmt: skip
+               "friction angle 0, undrained, Poisson's ratio above 0.45; dilation angle below the friction angle, for implicit "
+               "schemes only if the dilation angle is 0. Not with --paper, and for a site not for its dilation angles)")  # fmt: skip
     add_number(slide, "--time", None, "s", "duration of the slide (default: 16 for a height of 1 m, in proportion to its square "
                "root; 34.8 for the paper's run, a site and quasi-static steps)",
                above=0)  # fmt: skip
@@ -151,6 +155,9 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     if options.nmd is None and options.site is None:
         options.nmd = not options.paper and averages_strains(options.scheme, [law_of(options)])
     check_restart(p, options, MAY_CHANGE)
+    check_law_options(p, options)
+    check_site_options(p, options, SITE_OPTIONS)
+    check_effect(p, options, options.site is not None, ("--factor",), "--site")
     return options
 
 
@@ -291,7 +298,7 @@ def drawn(a: Namespace, scene: Scene | None, frames: list[dict], history: Histor
     def particles(name: str, key: str, quantity: Quantity) -> None:
         limits = colour_limits(quantity, [frame[key] for frame in frames])
         save_particles(folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
-                       limits=limits, title=title)  # fmt: skip
+                       limits=limits, title=title, legend=True)  # fmt: skip
 
     crest = history["crest_displacement_m"]
     pictures = {
@@ -353,8 +360,7 @@ def main(arguments: list[str] | None = None) -> int:
         changed = a.restarts[-1]["changed"]
         print(f"going on from {a.restart} at {case.model.time:g} s" + (f", changed: {changed}" if changed else ""))
     elif comm.rank == 0:
-        facts = ", ".join(f"{name.replace('_', ' ')} {value:.2g}" for name, value in start.items())
-        print(f"initial stresses ({a.initial}, {a.initial_unit_weight:g} N/m3): {facts}")
+        print(start_line(a, start))
 
     watch = Watch(case)
     keep_before = case.model.time if a.restart is not None else None
@@ -425,6 +431,18 @@ def energies(report: mpm.Report) -> dict[str, float]:
     names = ("external_work", "support_work", "kinetic_energy", "nodal_kinetic_energy", "stored_energy", "plastic_work",
              "damping_work", "pic_loss", "unexplained_energy")  # fmt: skip
     return {name: getattr(report, name) for name in names}
+
+
+def start_line(a: Namespace, start: dict[str, float]) -> str:
+    """How far the initial stresses are from equilibrium."""
+    kind = "zero" if a.initial == "zero" else f"{a.initial}, {a.initial_unit_weight:g} N/m3"
+    found = f"out-of-balance ratio {start['initial_out_of_balance_ratio']:.2g}"
+    if a.initial == "fem":
+        yielded, returned = (100 * start[f"{name}_fraction"] for name in ("newly_yielded", "returned_to_strength"))
+        found = (f"out-of-balance ratio before equilibration {start['initial_out_of_balance_ratio']:.2g}, after "
+                 f"{start['equilibrated_out_of_balance_ratio']:.2g}; newly yielded {yielded:.2g} %; returned to the yield "
+                 f"surface {returned:.2g} %")  # fmt: skip
+    return f"initial stresses ({kind}): {found}"
 
 
 def print_summary(summary: dict, folder: Path) -> None:

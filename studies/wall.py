@@ -18,12 +18,14 @@ import numpy as np
 from common import body_runs
 from common.body_runs import BodyRun, follow, mean_force
 from common.checkpoint import check_restart
+from common.checks import check_cells, check_effect, check_whole
 from common.earth_pressure import coulomb, stress_field, wall_acceleration
 from common.figures import Pictures, curve_figure
 from common.history import History
 from common.movie import particle_movie
 from common.options import add_choice, add_number, check, study_parser
 from common.plots import CURVES, GREY, Scene
+from common.quiet import GATHERS, without_warning
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
@@ -75,7 +77,13 @@ def parser() -> ArgumentParser:
         above=0,
     )
     add_number(
-        p, "--cell-size", 0.05, "-", "ratio of the side of the squares to the height of the wall", above=0, at_most=0.25
+        p,
+        "--cell-size",
+        0.05,
+        "-",
+        "ratio of the side of the squares to the height of the wall, 1 over a whole number",
+        above=0,
+        at_most=0.25,
     )
     body_runs.add_body_run_options(p, damping=0.0, pic=0.01, nmd=True, integration="particles", frames=40)
     return p
@@ -88,6 +96,10 @@ def parse(arguments: list[str] | None = None) -> Namespace:
         value = getattr(a, name)
         check(p, value <= a.friction_angle, lambda name=name, value=value: f"--{name.replace('_', '-')} is {value:g}, expected "
               f"at most --friction-angle, {a.friction_angle:g} degrees")  # fmt: skip
+    check_effect(p, a, a.motion == "free", ("--support", "--wall-mass"), "--motion free")
+    check_effect(p, a, a.motion != "free", ("--movement", "--speed"), "--motion active or passive")
+    check_whole(p, 1 / a.cell_size, f"--cell-size is {a.cell_size:g}, expected 1 over a whole number, such as 0.125")
+    check_cells(p, a, 15 / a.cell_size**2, "--cell-size")
     if a.movement is None:
         a.movement = 0.03 if a.motion == "passive" else 0.008
     check_restart(p, a, body_runs.MAY_CHANGE)
@@ -255,6 +267,7 @@ def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> P
 # --- 4. All together -------------------------------------------------------------------------------------------------
 
 
+@without_warning(GATHERS)
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     begin = perf_counter()

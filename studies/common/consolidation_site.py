@@ -202,6 +202,9 @@ def read_consolidation_site(
     if size is not None:
         constants["cell_size"] = size
     mesh = bridge.read_mesh(path.parent / table["mesh"], comm, parameters=constants)
+    for name in pressures or {}:
+        if name not in mesh[2].names:
+            raise mpm.InputError(f"--pressures names '{name}', expected some of {', '.join(mesh[2].names)}")
     laws, soils, weights = {}, {}, {}
     for name, given in table["soils"].items():
         where = f"{path}: soils.{name}"

@@ -14,6 +14,7 @@ from fenics_bridge import compat
 
 from .followed import FollowedNodes
 from .motions import as_motion, band_limited_noise, ricker
+from .quiet import NOT_REACHED, without_warning
 from .slope_case import GRAVITY
 
 comm = MPI.COMM_WORLD
@@ -26,7 +27,7 @@ STEP = 0.01
 def outcrop_motion(a: Namespace) -> tuple[np.ndarray, np.ndarray, mpm.Motion]:
     """Times [s], accelerations [m/s2] as given, and the motion of the rock's outcrop after the baseline correction."""
     if a.accelerogram is not None:
-        raw = mpm.read_accelerogram(a.accelerogram, unit=a.unit, baseline=None)
+        raw = recorded(a)
         return raw.time, np.gradient(raw.velocity, raw.time), as_motion(raw.time, np.gradient(raw.velocity, raw.time))
     if a.motion == "ricker":
         time, acceleration = ricker(a.frequency, a.peak, a.duration, STEP)
@@ -35,6 +36,19 @@ def outcrop_motion(a: Namespace) -> tuple[np.ndarray, np.ndarray, mpm.Motion]:
             (0.5 * a.frequency, a.highest_frequency), a.peak, a.duration, STEP, a.seed
         )
     return time, acceleration, as_motion(time, acceleration)
+
+
+def recorded(a: Namespace) -> mpm.Motion:
+    """The motion in the file of ``--accelerogram``."""
+    path = a.accelerogram
+    if not any(line.split("#")[0].strip() for line in path.read_text(errors="replace").splitlines()):
+        raise mpm.InputError(f"--accelerogram {path} is empty")
+    try:
+        return mpm.read_accelerogram(path, unit=a.unit, baseline=None)
+    except mpm.InputError as error:
+        raise mpm.InputError(
+            f"--accelerogram: expected two columns: time [s], acceleration [{a.unit}]; {error}"
+        ) from None
 
 
 def damping_of(a: Namespace) -> mpm.Rayleigh:
@@ -76,9 +90,12 @@ def model_in_equilibrium(a: Namespace, motion: mpm.Motion) -> mpm.Model:
     laws = laws_of(a)
     fem = bridge.QuasiStatic(body, laws, body_facets, supports, degree=1, cell_tags=body_cells,
                              solver=bridge.Solver(tolerance=1e-10))  # fmt: skip
-    fem.solve(bridge.Load(unit_weight=a.unit_weight))
+    with without_warning(NOT_REACHED):  # said by the error
+        fem.solve(bridge.Load(unit_weight=a.unit_weight))
     if not fem.converged:
-        raise mpm.InputError(f"--unit-weight is {a.unit_weight:g} N/m3, which the slope does not carry")
+        raise mpm.InputError(
+            f"--unit-weight is {a.unit_weight:g} N/m3, which the slope does not carry; lower it or raise --cohesion"
+        )
     model = mpm.Model(bridge.background_mesh(*mesh), fem.laws)
     for tag, law in laws.items():
         model.seed(

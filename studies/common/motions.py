@@ -42,13 +42,19 @@ def band_limited_noise(
     """
     n = round(duration / step) + 1
     time = step * np.arange(n)
-    frequency = np.fft.rfftfreq(2 * n, step)  # twice the length, since the ends of a Fourier series meet
-    inside = (frequency >= band[0]) & (frequency <= band[1])
+    frequency, inside = noise_band(band, duration, step)
     phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(frequency))
     noise = np.fft.irfft(inside * np.exp(1j * phase), 2 * n)[:n]
     part = time / (0.2 * duration)
     acceleration = noise * (part * np.exp(1 - part)) ** 2
     return time, acceleration * peak / np.abs(acceleration).max()
+
+
+def noise_band(band: tuple[float, float], duration: float, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (k) [Hz] of the Fourier series of `band_limited_noise`, and whether each is in the band."""
+    n = round(duration / step) + 1
+    frequency = np.fft.rfftfreq(2 * n, step)  # twice the length, since the ends of a Fourier series meet
+    return frequency, (frequency >= band[0]) & (frequency <= band[1])
 
 
 def as_motion(time: np.ndarray, acceleration: np.ndarray) -> mpm.Motion:

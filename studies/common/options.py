@@ -17,7 +17,7 @@ import argparse
 import math
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NoReturn
@@ -32,13 +32,14 @@ from .parameters import Parameter, ParameterError, checked_values, described, re
 class Options(argparse.Namespace):
     """Options as parsed; ``vars`` gives their values, `parameters` also their units and meanings.
 
-    ``notes`` are those of the checkpoint of ``--restart``, and ``restarts`` has a row for each time that the run went on from
-    one; see ``checkpoint.py``.
+    ``given`` has the options that the command line names, ``--no-name`` where it says so. ``notes`` are those of the checkpoint
+    of ``--restart``, and ``restarts`` has a row for each time that the run went on from one; see ``checkpoint.py``.
     """
 
-    __slots__ = ("actions", "description", "study", "notes", "restarts")
+    __slots__ = ("actions", "description", "given", "study", "notes", "restarts")
     actions: list[argparse.Action]
     description: str
+    given: set[str]
     study: str
     notes: Mapping[str, Any]
     restarts: list[dict[str, Any]]
@@ -55,6 +56,7 @@ class _Help(argparse.RawDescriptionHelpFormatter):
         text, default = action.help or "", action.default
         if not hasattr(action, "meaning") or default is None:
             return text
+        text = re.sub(r" \(default: [^()]*\)", "", text)  # that of studies where it follows from other options
         if isinstance(action, argparse.BooleanOptionalAction):
             default = action.option_strings[0 if default else 1]
         return f"{text} (default: {default:g})" if isinstance(default, float) else f"{text} (default: {default})"
@@ -67,6 +69,7 @@ class _Parser(argparse.ArgumentParser):
         options = Options()
         options.actions, options.study = self._actions, self.prog.split()[-1]
         options.description = self.description or options.study
+        options.given = {word.split("=")[0] for word in (sys.argv[1:] if args is None else args) if word[:2] == "--"}
         options.notes, options.restarts = {}, []
         try:
             self._take_defaults_from_files(args, options)
@@ -87,12 +90,11 @@ class _Parser(argparse.ArgumentParser):
             values |= checked_values(f"checkpoint {given.restart}", options.notes["options"], self._actions)
         if given.parameters is not None:
             values |= read_parameters(Path(given.parameters), self._actions)
-        self._refuse_code(args, values)
+        self._refuse_code(options.given, values)
         self.set_defaults(**values)
 
-    def _refuse_code(self, args: Sequence[str] | None, values: Mapping[str, object]) -> None:
+    def _refuse_code(self, words: set[str], values: Mapping[str, object]) -> None:
         """Refuse code that only a file names: the command line must name it too, or allow it."""
-        words = {word.split("=")[0] for word in (sys.argv[1:] if args is None else args)}
         for action in self._actions:
             if not getattr(action, "runs_code", False) or values.get(action.dest) is None:
                 continue
@@ -109,8 +111,7 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         message = re.sub(r"^argument ([^:]+): (is|has) ", r"\1 \2 ", message)
         wrong = re.search(r"unrecognized arguments: (--[\w-]+)", message)
-        near = get_close_matches(wrong.group(1), self._option_string_actions, cutoff=0.75) if wrong else []
-        message += f"; did you mean {' or '.join(near)}?" if near else ""
+        message += did_you_mean(wrong.group(1), self._option_string_actions) if wrong else ""
         self.exit(2, f"{self.prog}: {message}\n(--help lists the options)\n")
 
 
@@ -166,6 +167,7 @@ def add_number(
     bounds = [(above, "above", lambda x, b: x > b), (at_least, "at least", lambda x, b: x >= b)]
     bounds += [(below, "below", lambda x, b: x < b), (at_most, "at most", lambda x, b: x <= b)]
     given = [(bound, word, holds) for bound, word, holds in bounds if bound is not None]
+    kind = "ratio" if text.startswith("ratio ") else "number"
     expected = " and ".join([f"{word} {bound:g}" for bound, word, _ in given])
     label = "" if unit == "-" else f" {unit}"
 
@@ -175,7 +177,7 @@ def add_number(
         except ValueError:
             result = math.nan
         if not math.isfinite(result) or not all(holds(result, bound) for bound, _, holds in given):
-            raise argparse.ArgumentTypeError(f"is '{value}', expected a number {expected}{label}".replace("  ", " "))
+            raise argparse.ArgumentTypeError(f"is '{value}', expected a {kind} {expected}{label}".replace("  ", " "))
         return result
 
     number.takes = "a number"  # type: ignore[attr-defined]
@@ -205,7 +207,8 @@ def add_choice(
 
     def choice(value: str) -> str:
         if value not in choices:
-            raise argparse.ArgumentTypeError(f"is '{value}', expected one of {', '.join(choices)}")
+            near = did_you_mean(value, choices)
+            raise argparse.ArgumentTypeError(f"is '{value}', expected one of {', '.join(choices)}{near}")
         return value
 
     _add(parser, name, default, text, type=choice, metavar="|".join(choices))
@@ -238,6 +241,12 @@ def add_code(parser: argparse.ArgumentParser, name: str, metavar: str, text: str
             "--allow-code",
             "run the code that a file of parameters or a checkpoint names; see docs/howto/trust.md",
         )
+
+
+def did_you_mean(word: str, names: Iterable[str]) -> str:
+    """What a message adds for a word that is nearly one of some names; empty where it is not."""
+    near = get_close_matches(word, list(names), cutoff=0.8)
+    return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 def check(parser: argparse.ArgumentParser, holds: bool, message: Callable[[], str] | str) -> None:

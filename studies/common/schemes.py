@@ -11,6 +11,7 @@ from mpm_core.setup_warnings import dilates, keeps_volume, locks_at_failure
 
 import mpm_core as mpm
 
+from .checks import check_effect
 from .options import add_choice, add_count, add_number, add_switch, check
 
 SCHEMES = ("explicit", "implicit", "quasi-static")
@@ -22,6 +23,10 @@ INTEGRATIONS = {
 }
 TRANSFERS = {"flip": mpm.Transfer.FLIP, "affine": mpm.Transfer.AFFINE}
 
+PER_CELL = tuple(
+    sorted({k * (k + 1) // 2 * 4**s for k in range(1, 14) for s in range(4) if k * (k + 1) * 4**s <= 200})
+)
+"""Numbers of particles that fill a triangle evenly: a lattice of k(k+1)/2 in each of the 4^s parts that its mid-edges make"""
 IMPLICIT_STEP = 20.0
 """Default step of the implicit schemes over the critical one."""
 
@@ -42,9 +47,8 @@ def add_scheme_options(parser: argparse.ArgumentParser, integration: str | None 
 
 def add_particles_per_cell(parser: argparse.ArgumentParser, default: int) -> None:
     """Option ``--particles-per-cell``."""
-    add_count(
-        parser, "--particles-per-cell", default, "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ..."
-    )
+    text = "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ..."
+    add_count(parser, "--particles-per-cell", default, text, choices=PER_CELL)
 
 
 def add_pic(parser: argparse.ArgumentParser, default: float | None, about: str = "") -> None:
@@ -59,8 +63,8 @@ def add_damping(parser: argparse.ArgumentParser) -> None:
     """Options ``--damping``, ``--mass-damping`` and ``--pic``, which `choose_damping` fills in."""
     add_number(parser, "--damping", None, "-", "local damping (default: 0; 0.75 for the paper's run, a site and quasi-static steps)",
                at_least=0, below=1)  # fmt: skip
-    add_number(parser, "--mass-damping", None, "1/s", "forces against the motion, this number times the momentum; a slide depends "
-               "less on the cells with them than with local damping (default: 5 for a height of 1 m, in inverse "
+    add_number(parser, "--mass-damping", None, "1/s", "mass-proportional damping; results depend less on the mesh than with "
+               "local damping (default: 5 for a height of 1 m, in inverse "
                "proportion to its square root; 0 with local damping or affine transfer, for the paper's run, a site and quasi-static steps)", at_least=0)  # fmt: skip
     add_pic(parser, None, about="; default: 0.02 with mass damping, otherwise 0")
 
@@ -114,8 +118,8 @@ def add_discretisation(parser: argparse.ArgumentParser, integration: str | None 
         + (
             ""
             if integration
-            else f" (default: mixed; particles with --paper, without cohesion, and below {LEAST_IN_CELL[2]} "
-            "particles in a cell)"
+            else f" (default: mixed; particles with --paper, or if the soil has no cohesion, or with fewer than "
+            f"{LEAST_IN_CELL[2]} particles per cell)"
         ),
     )
     add_choice(
@@ -132,6 +136,10 @@ def check_scheme_options(parser: argparse.ArgumentParser, options: argparse.Name
                   "from zero")  # fmt: skip
     check(parser, not options.second_order or options.scheme == "implicit",
           lambda: f"--second-order is given, expected --scheme implicit with it, not {options.scheme}")  # fmt: skip
+    explicit = options.scheme == "explicit"
+    check_effect(parser, options, not explicit, ("--solver",), "--scheme implicit or quasi-static")
+    check_effect(parser, options, explicit, ("--transfer",), "--scheme explicit")
+    check_effect(parser, options, options.initial != "zero", ("--initial-unit-weight",), "--initial fem, elastic or k0")
     check(parser, not options.second_order or options.damping == 0,
           lambda: f"--second-order is given with --damping {options.damping:g}, expected --damping 0 with it: such steps do not "
                   "bring a slope to rest")  # fmt: skip

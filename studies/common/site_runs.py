@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 
+from .checks import check_effect
 from .collapse_runs import UNDECIDED
 from .field_plots import bend, mechanism_field, save_convergence, save_curves, save_mechanism
 from .figures import Pictures
@@ -25,7 +26,18 @@ from .summary import write_summary
 def add_site_option(parser: argparse.ArgumentParser) -> None:
     """Option ``--site``."""
     parser.add_argument("--site", type=Path, default=None, metavar="FILE", help="TOML file of a mesh and its soils by name, such "
-                        "as meshes/embankment.toml, instead of the slope, whose options then have no effect")  # fmt: skip
+                        "as meshes/embankment.toml, instead of the slope and its options")  # fmt: skip
+
+
+def check_site_options(parser: argparse.ArgumentParser, options: Namespace, names: set[str]) -> None:
+    """End with an error where the command line names options that a site does not have.
+
+    Args:
+        names: of the options that it has, without dashes, besides those of the results.
+    """
+    kept = {f"--{name}" for name in (*names, "site", "output", "overwrite", "parameters")}
+    others = [name for name in sorted(options.given) if name.replace("--no-", "--") not in kept]
+    check_effect(parser, options, options.site is None, others, "no --site")
 
 
 def site_study(
@@ -50,7 +62,8 @@ def site_study(
     runs = []
     for size in sizes:
         site = read_site(a.site, comm, size)
-        progress = step_line("site" if size is None else f"cells of {size:g} m")
+        cells = "site" if size is None else f"cells of {size:g} m"
+        progress = step_line(f"{cells}, {label[0].lower()}{label[1:]}")
         model = site.finite_elements(**finite_elements(a))
         runs.append(find(site, model, progress))
     rows = [{"cell_size_m": size, name: run.value, "failed_at": run.failed_at, "failure_shown": run.failed,
@@ -84,6 +97,6 @@ def _drawn(
         "value_displacement": lambda: save_curves(
             folder / "value_displacement.png", curves, ("Largest displacement [mm]", label), limits=((0, wide), (lowest, None))),
     }  # fmt: skip
-    if None in sizes:
+    if None in sizes or len(sizes) < 2:
         return pictures
     return {**pictures, "convergence": lambda: save_convergence(folder / "convergence.png", sizes, values, label, None)}

@@ -57,8 +57,6 @@ def check_fem_slope_options(parser: argparse.ArgumentParser, options: argparse.N
     if options.mesh is None and options.angle in (45, 90):
         options.mesh = "fitted"  # as "crossed", for any cell size
     check_slope_options(parser, options, cells=40)
-    check(parser, options.cell_size <= min(options.height, options.crest),
-          lambda: f"--cell-size is {options.cell_size:g}, expected at most --height and --crest")  # fmt: skip
     check(
         parser, options.cohesion > 0, "--cohesion is 0, expected a number above 0: without cohesion no slope is stable"
     )

@@ -11,6 +11,7 @@ from typing import Any
 
 import mpm_core as mpm
 
+from .checks import check_effect
 from .options import add_choice, add_code, add_number, add_switch
 
 MATERIALS = (
@@ -23,6 +24,19 @@ MATERIALS = (
     "cam-clay",
     "elastic",
 )
+
+
+FRICTIONAL = ("mohr-coulomb", "viscoplastic", "softening", "drucker-prager")
+ONLY_WITH = {
+    ("--viscosity",): ("viscoplastic",),
+    ("--residual-cohesion", "--residual-friction-angle", "--softening-strain", "--reference-length"): ("softening",),
+    ("--compression-slope", "--swelling-slope", "--critical-slope", "--void-ratio", "--preconsolidation",
+     "--attraction"): ("cam-clay",),
+    ("--friction-angle", "--dilation-angle", "--tension-cutoff"): FRICTIONAL,
+    ("--cohesion",): (*FRICTIONAL, "tresca", "von-mises"),
+    ("--young",): tuple(name for name in MATERIALS if name != "cam-clay"),
+}  # fmt: skip
+"""Options that only some laws have"""
 
 
 def add_law_options(
@@ -93,6 +107,17 @@ def add_parameter(
     )
 
 
+def check_law_options(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    """End with an error where the command line names options that the law does not have."""
+    own = "--python-law" if options.python_law else "--umat" if options.umat else ""
+    if own:
+        check_effect(parser, options, False, ("--material", "--viscosity"), f"no {own}")
+    for names, materials in () if own else ONLY_WITH.items():
+        check_effect(parser, options, options.material in materials, names, f"--material {' or '.join(materials)}")
+    umat = ("--properties", "--strength-properties", "--variables")
+    check_effect(parser, options, options.umat is not None, umat, "--umat")
+
+
 def law_of(args: argparse.Namespace) -> Any:
     """The law that the options describe.
 
@@ -110,8 +135,10 @@ def law_of(args: argparse.Namespace) -> Any:
 def _python_law(text: str) -> Any:
     """The law of a class in a file, "FILE:CLASS"."""
     file, _, name = text.rpartition(":")
-    if not Path(file).is_file():
+    if not file:
         raise mpm.InputError(f"--python-law is '{text}', expected a file, a colon and a class in it")
+    if not Path(file).is_file():
+        raise mpm.InputError(f"--python-law is '{text}', but the file {file} does not exist")
     sys.path.insert(0, str(Path(file).parent))  # for what it imports beside it
     spec = importlib.util.spec_from_file_location("law_of_the_user", file)
     module = importlib.util.module_from_spec(spec)
@@ -141,6 +168,8 @@ def _strength_properties(words: Sequence[str]) -> dict[int, str]:
 def _skeleton(a: argparse.Namespace) -> Any:
     elastic = {"young": a.young, "poisson": a.poisson}
     if a.umat:
+        if not Path(a.umat).is_file():
+            raise mpm.InputError(f"--umat is '{a.umat}', but the file does not exist")
         modulus = mpm.LinearElastic(**elastic).p_wave_modulus
         return mpm.Umat(
             a.umat,

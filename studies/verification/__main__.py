@@ -13,7 +13,8 @@ from time import process_time
 
 from _case import Result, line
 from _table import CaseRow, Table, case_row, save_docs, save_page, save_table
-from common.options import add_flag, check, study_parser
+from common.files import PROGRAM
+from common.options import add_flag, check, did_you_mean, study_parser
 from common.ranks import run_study
 from common.results import ROOT, note_what_was_written, open_results, subfolder
 from mpi4py import MPI
@@ -62,7 +63,7 @@ CASES = tuple(name for names in GROUPS.values() for name in names)
 
 def parse(arguments: list[str] | None = None) -> Namespace:
     p = study_parser(__doc__)
-    p.prog = "studies/run verification"
+    p.prog = f"{PROGRAM} verification"  # of a folder with a __main__.py
     p.add_argument("--cases", default=",".join(CASES), metavar="NAME,...", help=f"cases to run, of {', '.join(CASES)} "
                    "(default: all)")  # fmt: skip
     add_flag(p, "--quick", "small sizes, as the tests run them; tolerances are wider where sizes matter")
@@ -73,7 +74,9 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     )
     options = p.parse_args(arguments)
     for name in options.cases.split(","):
-        check(p, name in CASES, f"--cases names '{name}', expected some of {', '.join(CASES)}")
+        check(
+            p, name in CASES, f"--cases names '{name}', expected some of {', '.join(CASES)}{did_you_mean(name, CASES)}"
+        )
     check(p, not (options.docs and options.quick), "--docs needs the full sizes, without --quick")
     return options
 

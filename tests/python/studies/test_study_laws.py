@@ -86,7 +86,7 @@ def test_retrogression_starts_in_equilibrium_and_yields_on_two_meshes(tmp_path):
         last = (tmp_path / f"history_{size.removesuffix('_m')}.csv").read_text().splitlines()[-1]
         assert float(last.split(",")[5]) > 0  # fraction of particles that yield
         assert float(last.split(",")[3]) > 0
-    for name in ("meshes.png", "history_0.5.csv", "displacement_1.png"):
+    for name in ("history.png", "history_0.5.csv", "displacement_1.png"):
         assert (tmp_path / name).stat().st_size > 0
 
 

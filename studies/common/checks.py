@@ -1,0 +1,55 @@
+"""Checks of options that depend on each other, on files or on the size of a mesh; each ends the run with an error."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from .options import check
+
+
+def check_effect(
+    parser: argparse.ArgumentParser, options: argparse.Namespace, holds: bool, names: Sequence[str], expected: str
+) -> None:
+    """End with an error when the command line names options that have no effect with others. A file of parameters may name them.
+
+    Args:
+        holds: whether they have an effect.
+        expected: with which options they would have one.
+    """
+    for name in () if holds else names:
+        check(parser, name not in getattr(options, "given", ()), f"{name} is given, expected {expected} with it")
+
+
+def check_whole(parser: argparse.ArgumentParser, cells: float, message: Callable[[], str] | str) -> None:
+    """End with an error when a body does not consist of whole cells.
+
+    Args:
+        cells: length of the body over that of a cell.
+    """
+    check(parser, abs(cells - round(cells)) <= 1e-4 * cells, message)
+
+
+def check_file(parser: argparse.ArgumentParser, path: Path | None, name: str) -> None:
+    """End with an error when an option names a file that is not there."""
+    check(parser, path is None or path.is_file(), lambda: f"{name} is {path}, but there is no such file")
+
+
+MOST_CELLS = 2e7
+"""Number of cells above which a mesh is a mistake: on one machine it takes its memory"""
+
+
+def check_cells(parser: argparse.ArgumentParser, options: argparse.Namespace, cells: float, *names: str) -> None:
+    """End with an error, before a mesh is made, when it would have more than `MOST_CELLS` cells.
+
+    Args:
+        cells: estimated number.
+        names: of the options on which it depends.
+    """
+    values = ", ".join(f"{name} {getattr(options, name[2:].replace('-', '_')):g}" for name in names)
+    check(
+        parser,
+        cells <= MOST_CELLS,
+        lambda: f"{values}: the mesh would have some {cells:.2g} cells, expected at most {MOST_CELLS:.0e}",
+    )
