@@ -7,6 +7,7 @@ import io
 import signal
 import sys
 import traceback
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
@@ -72,6 +73,7 @@ def run_study(main: Callable[[], int], *expected: type[BaseException]) -> NoRetu
     name = script.parent.name if script.stem == "__main__" else script.stem
     end_all_on_error(comm)
     outlive_readers()
+    warnings.formatwarning = lambda text, *_, **__: f"warning: {text}\n"  # where in the source does not help a user
     signal.signal(signal.SIGUSR1, signal.default_int_handler)  # by which `studies/run --ranks` hands Ctrl-C on
     try:
         code = main()
