@@ -18,6 +18,7 @@ from types import ModuleType
 from common.figures import Pictures
 from common.options import add_count, check, study_parser
 from common.page import Page
+from common.quiet import LOCKS, without_warning
 from common.ranks import run_study
 from common.results import open_results
 from common.summary import write_summary
@@ -99,7 +100,9 @@ def finest(rows: list[dict]) -> dict[str, dict[str, float]]:
 
 def drawn(case: ModuleType, rows: list[dict], last: dict[str, dict[str, Found]], folder: Path) -> Pictures:
     """Error over cell size, and the mean stresses side by side."""
-    pictures = {f"error_{case.NAME}": partial(save_errors, folder / f"error_{case.NAME}.png", rows, case.TITLE)}
+    pictures = {}
+    if len({row["divisions"] for row in rows if row["scheme"] == rows[0]["scheme"]}) > 1:
+        pictures[f"error_{case.NAME}"] = partial(save_errors, folder / f"error_{case.NAME}.png", rows, case.TITLE)
     for scheme, found in last.items():
         poisson = case.POISSON[scheme][-1]
         title = f"{case.TITLE}, {scheme}, $\\nu$ = {poisson:.9g}"
@@ -109,6 +112,7 @@ def drawn(case: ModuleType, rows: list[dict], last: dict[str, dict[str, Found]],
     return pictures
 
 
+@without_warning(LOCKS)  # that is what this study shows
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     start = perf_counter()
