@@ -119,10 +119,15 @@ class Table:
         verdicts = [check.verdict for check in checks]
         errors = [case.name for case in self.cases if case.error]
         return (
-            f"{len(self.cases)} cases, {len(checks)} checks: {verdicts.count('pass')} pass, "
+            f"{_number(self.cases, 'case')}, {_number(checks, 'check')}: {verdicts.count('pass')} pass, "
             f"{verdicts.count('FAIL')} fail, {verdicts.count('known limit')} known limits"
             + (f"; errors in {', '.join(errors)}" if errors else "")
         )
+
+
+def _number(things: Sequence[object], noun: str) -> str:
+    """How many there are, in words."""
+    return f"{len(things)} {noun}{'' if len(things) == 1 else 's'}"
 
 
 def percent(fraction: float) -> str:
