@@ -1,0 +1,62 @@
+"""What studies print: warnings that they leave out, and lines of results."""
+
+import importlib
+import re
+import sys
+import warnings
+from argparse import Namespace
+from pathlib import Path
+
+import pytest
+from mpm_core import failure_watch
+
+STUDIES = Path(__file__).parents[3] / "studies"
+sys.path.insert(0, str(STUDIES))
+
+from common import quiet, seepage_plots  # noqa: E402
+
+
+def test_warnings_that_a_study_leaves_out_are_those_of_the_core():
+    assert re.match(quiet.GATHERS, failure_watch.GATHERING) and re.match(quiet.LOCKS, failure_watch.LOCKING)
+    assert not re.match(quiet.LOCKS, failure_watch.GATHERING)
+
+    @quiet.without_warning(quiet.LOCKS)
+    def warned(text):
+        warnings.warn(text, RuntimeWarning)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warned(failure_watch.LOCKING)
+        with pytest.raises(RuntimeWarning, match="particles gather"):
+            warned(failure_watch.GATHERING)
+
+
+def test_round_off_of_an_inflow_is_nothing():
+    inflows = {"upstream": 0.5, "downstream": -0.5, "crest": 1.9e-20}
+    litres = importlib.import_module("seepage").litres
+    assert [litres(value, inflows) for value in inflows.values()] == [500, -500, 0]
+    assert litres(0.0, {"crest": 0.0}) == 0
+
+
+@pytest.mark.parametrize("number, shown", [(1, [0]), (3, [0, 1, 2]), (7, [0, 2, 4, 6])])
+def test_few_pictures_are_drawn_of_many(number, shown):
+    assert seepage_plots.few(list(range(number))) == shown
+
+
+def test_initial_stresses_are_described_in_a_line():
+    line = importlib.import_module("slope").start_line
+    ratios = {"initial_out_of_balance_ratio": 0.25, "equilibrated_out_of_balance_ratio": 1e-9,
+              "newly_yielded_fraction": 0.02, "returned_to_strength_fraction": 0.0}  # fmt: skip
+    assert (
+        line(Namespace(initial="zero", initial_unit_weight=18e3), ratios)
+        == "initial stresses (zero): out-of-balance ratio 0.25"
+    )
+    assert line(Namespace(initial="fem", initial_unit_weight=18e3), ratios) == (
+        "initial stresses (fem, 18000 N/m3): out-of-balance ratio before equilibration 0.25, after 1e-09; newly yielded 2 %; "
+        "returned to the yield surface 0 %"
+    )
+
+
+def test_help_shows_one_default_of_an_option():
+    text = " ".join(importlib.import_module("retrogression").parser().format_help().split())
+    assert "length of the level crest [m] (default: 30)" in text and "1.1 times the height" not in text
