@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -21,6 +22,11 @@ if TYPE_CHECKING:
 
 FINENESS = 4
 """Points to a particle's side at which the surface is loaded"""
+
+NEARLY = 1.25
+"""Distance from a particle, over its side, within which a part of the surface without load is probably one beside soil"""
+MOST_MISSED = 0.1
+"""Fraction of the loaded area from which such parts are worth a warning; at ends of the soil there are always some"""
 
 Samples = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 """Points, the parts of the surface that they stand for, and its normals towards the soil"""
@@ -66,7 +72,22 @@ def load_surface(model: Body, surface: Surface, pressure: float | None, traction
     forces = particles.traction.copy() if len(particles.traction) else np.zeros((len(size), dim))
     np.add.at(forces, numbers[found[own]], parts[own, None] * (normal_stress * normals[own] + vector))
     particles.set("traction", forces)
-    return float(parts[loaded].sum())
+    area = float(parts[loaded].sum())
+    _, squares = nearest(points[~loaded], normals[~loaded], particles.position[near], NEARLY * size[near])
+    is_near = np.array(model.comm.allgather(np.isfinite(squares))).any(axis=0)
+    _warn_of_gaps(model.comm, surface, float(parts[~loaded][is_near].sum()), area)
+    return area
+
+
+def _warn_of_gaps(comm: MPI.Comm, surface: Surface, missed: float, area: float) -> None:
+    """Warn of a surface that the soil does not reach everywhere."""
+    if comm.rank == 0 and missed > MOST_MISSED * area:
+        warnings.warn(
+            f"{missed / (missed + area):.0%} of the area of surface {surface!r} carries no load: the soil beside it has no particle within "
+            "a particle's side V^(1/D); place particles along the surface",
+            RuntimeWarning,
+            stacklevel=4,
+        )
 
 
 def samples(surface: Surface, lower: NDArray[np.float64], upper: NDArray[np.float64], spacing: float) -> Samples:

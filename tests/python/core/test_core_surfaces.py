@@ -103,6 +103,19 @@ def test_loads_need_soil_and_one_kind():
         loaded(mpm.Plane((0, 0.95), (0, -1)), pressure=1.0)
 
 
+@pytest.mark.parametrize("away, missing", [(0.0, 0.0), (0.025, 0.17)])
+def test_a_surface_that_particles_do_not_reach_everywhere_is_warned_of(away, missing, recwarn):
+    # A round cavity in particles on a square grid of 0.05 m, which are left out where their centres are less than `away` outside.
+    model = mpm.Model(box((8, 8), (2.4, 2.4)), mpm.LinearElastic(young=1e6, poisson=0.3))
+    grid = (np.indices((48, 48)).reshape(2, -1).T + 0.5) * 0.05
+    grid = grid[np.hypot(*(grid - 1.2).T) > 0.3 + away]
+    model.seed_points(grid, np.full(len(grid), 0.05**2), density=1.0)
+    area = model.load_surface(mpm.Disc((1.2, 1.2), 0.3), pressure=1.0)
+    assert area == pytest.approx((1 - missing) * 2 * np.pi * 0.3, rel=0.02)
+    said = [str(one.message) for one in recwarn if "carries no load" in str(one.message)]
+    assert said == [] if missing == 0 else said[0].startswith("17% of the area of surface Disc(")
+
+
 def test_a_cavity_in_a_tied_ring_widens_as_lame_says():
     # An annulus from a to b on a mesh that knows nothing of it: p on the inside, which acts on the innermost particles, and a
     # rigid ring, which holds the outermost ones at b - h/2. u = A r + B / r, sigma_r = 2 (lambda + G) A - 2 G B / r^2.
