@@ -232,8 +232,9 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
         """Load the particles beside a surface that does not follow the mesh: ground, a cavity, a footing's lower side.
 
         Each part of the surface gives its load to the particle nearest to it, on the side where the soil is; parts without any
-        within the particle's side V^(1/D) are not loaded, which a warning says where soil is a little farther away. The forces move with the particles, keep their direction, and add to
-        those that are there. The sum of forces is that of the surface to round-off; they act half a particle inside of it.
+        within the particle's side V^(1/D) are not loaded, which a warning says where soil is a little farther away. The forces
+        move with the particles, keep their direction, and add to those that are there. The sum of forces is that of the surface
+        to round-off; they act half a particle inside of it.
 
         Args:
             surface: as for `add_contact`; it bounds the soil where it is to be loaded, and its shape is taken once. Let one
