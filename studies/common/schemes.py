@@ -23,10 +23,10 @@ INTEGRATIONS = {
 }
 TRANSFERS = {"flip": mpm.Transfer.FLIP, "affine": mpm.Transfer.AFFINE}
 
-PER_CELL = tuple(
-    sorted({k * (k + 1) // 2 * 4**s for k in range(1, 14) for s in range(4) if k * (k + 1) * 4**s <= 200})
-)
-"""Numbers of particles that fill a triangle evenly: a lattice of k(k+1)/2 in each of the 4^s parts that its mid-edges make"""
+# fmt: off
+PER_CELL = (1, 3, 4, 6, 8, 10, 12, 15, 16, 20, 21, 24, 28, 32, 35, 36, 40, 45, 48, 55, 56, 60, 64, 66, 78, 80, 84, 91, 96)
+"""Numbers of particles, up to a hundred, that fill a triangle or a tetrahedron evenly"""
+# fmt: on
 IMPLICIT_STEP = 20.0
 """Default step of the implicit schemes over the critical one."""
 
@@ -47,7 +47,7 @@ def add_scheme_options(parser: argparse.ArgumentParser, integration: str | None 
 
 def add_particles_per_cell(parser: argparse.ArgumentParser, default: int) -> None:
     """Option ``--particles-per-cell``."""
-    text = "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ..."
+    text = "particles in each soil cell at the start: 1, 3, 4, 6, 10, 12, ...; in a tetrahedron 1, 4, 8, 10, ..."
     add_count(parser, "--particles-per-cell", default, text, choices=PER_CELL)
 
 
