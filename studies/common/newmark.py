@@ -5,9 +5,6 @@ Newmark (1965), Effects of earthquakes on dams and embankments, Géotechnique 15
 
 from __future__ import annotations
 
-import cmath
-import math
-
 import numpy as np
 from scipy.optimize import differential_evolution
 
@@ -89,28 +86,12 @@ def yield_acceleration(
         InputError: depth is inf, and the slope would yield at more than g tan(friction_angle). At that acceleration soil of unlimited
             depth slides as a whole, so that there is no worst spiral: those that reach deeper are always worse.
     """
-    slope, friction = np.radians(angle), np.radians(friction_angle)
-
-    def begin(start: float) -> np.ndarray:
-        return np.array([height / np.tan(slope) + height * np.exp(start), height])
-
-    def coefficient(start: float, turn: float) -> float:
-        return _coefficient(begin(start), turn, slope, cohesion, friction, unit_weight)
-
-    # Deep and shallow spirals have a minimum each, deep ones where they touch the bottom, at the end of the range of turns.
-    starts, parts = np.linspace(*np.log([1e-3, 1e3]), 70), np.linspace(0.0, 1.0, 41)[1:]
-    largest = [_largest_turn(begin(start), friction, depth) for start in starts]
-    trials = [(start, part, most) for start, most in zip(starts, largest) for part in parts]
-    best = np.array(min(trials, key=lambda trial: coefficient(trial[0], trial[1] * trial[2]))[:2])
-    around = np.array([starts[1] - starts[0], parts[1] - parts[0]])
-    box = np.transpose([best - around, np.minimum(best + around, (np.inf, 1.0))])
+    slope, friction = np.radians([angle, friction_angle])
+    box = [np.log([1e-3, 1e4]), (0.02, 1.0)]  # as they turn by less, spirals become planes, with a pole far away
     worst = differential_evolution(
-        lambda where: coefficient(where[0], where[1] * _largest_turn(begin(where[0]), friction, depth)),
-        box,
-        tol=1e-8,
-        seed=1,
-        polish=False,
-    )
+        lambda where: _coefficients(*where, height, slope, cohesion / unit_weight, friction, depth),
+        box, popsize=40, tol=1e-8, seed=1, polish=False, updating="deferred", vectorized=True,
+    )  # fmt: skip
     if not np.isfinite(depth) and worst.fun > np.tan(friction):
         raise mpm.InputError(
             f"depth is inf, expected the depth of the soil below the toe: soil of unlimited depth slides as a whole at "
@@ -119,49 +100,47 @@ def yield_acceleration(
     return gravity * float(worst.fun)
 
 
-def _spiral(begin: np.ndarray, turn: float, friction: float) -> tuple[complex, float]:
-    """First radius, as a complex number whose argument is its angle below the horizontal, and last angle of the spiral that turns by
-    an angle from a point to the toe, which is the origin."""
-    ray = -complex(begin[0], -begin[1]) / (cmath.exp(turn * (math.tan(friction) + 1j)) - 1)
-    return ray, cmath.phase(ray) + turn
+def _coefficients(
+    behind: np.ndarray, part: np.ndarray, height: float, slope: float, strength: float, friction: float, depth: float
+) -> np.ndarray:
+    """Horizontal over vertical acceleration by spirals from the crest to the toe: (n,).
+
+    Args:
+        behind: where they begin behind the shoulder (n,), as the logarithm of the distance over the height.
+        part: of the largest angle by which a spiral may turn (n,), see `_largest_turn`.
+        height: [m]; slope, friction: angles [rad]; depth: [m].
+        strength: cohesion over unit weight [m].
+    """
+    growth, back = np.tan(friction) + 1j, height / np.tan(slope)
+    begin = (back + height * np.exp(behind) - 1j * height)[:, None]  # from the toe, downwards
+    turn = part[:, None] * _largest_turn(begin, friction, depth)
+    spiral = _radius(begin, turn, growth) * np.exp(np.linspace(0.0, 1.0, SAMPLES) * turn * growth)
+    x, y = spiral.real, -spiral.imag  # from the centre; the slope descends to the left
+    surface = np.minimum(y[:, :1], y[:, -1:] + np.tan(slope) * (x - x[:, -1:]))
+    is_below = np.all(y <= surface + 1e-9 * height, axis=1)
+    dissipation = strength * np.diff(np.abs(spiral[:, [0, -1]]) ** 2)[:, 0] / (2 * growth.real)
+    x, y = np.hstack([x, x[:, -1:] + back]), np.hstack([y, y[:, :1]])
+    cross = x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y  # of the soil, a polygon
+    across, up = (np.sum((c + np.roll(c, -1, axis=1)) * cross, axis=1) / 6 for c in (x, y))
+    # the mass turns to the left and downwards: its weight acts on the arm x, horizontal inertia to the left on the arm -y
+    sign = np.sign(cross.sum(axis=1))
+    return np.where(is_below, (dissipation - sign * across) / (-sign * up), IMPOSSIBLE)
 
 
-def _largest_turn(begin: np.ndarray, friction: float, depth: float) -> float:
-    """Turn of the spiral to the toe that begins and ends at the horizontal of its centre at most, or reaches a depth below the toe."""
-    lowest = 0.5 * math.pi + friction
-    least, most = 0.0, math.pi
+def _radius(begin: np.ndarray, turn: np.ndarray, growth: complex) -> np.ndarray:
+    """First radii of spirals to the toe, as complex numbers whose arguments are their angles below the horizontal."""
+    return -begin / (np.exp(turn * growth) - 1)
+
+
+def _largest_turn(begin: np.ndarray, friction: float, depth: float) -> np.ndarray:
+    """Turn of spirals to the toe that begin and end at the horizontal of their centre at most, or reach a depth below the toe."""
+    growth, lowest = np.tan(friction) + 1j, 0.5 * np.pi + friction
+    least, most = np.zeros(begin.shape), np.full(begin.shape, np.pi)
     for _ in range(40):
         turn = 0.5 * (least + most)
-        ray, end = _spiral(begin, turn, friction)
-        start = end - turn
-        reaches = abs(ray) * (
-            math.exp((lowest - start) * math.tan(friction)) * math.sin(lowest)
-            - math.exp(turn * math.tan(friction)) * math.sin(end)
-        )
-        fits = 0.0 < start and end < math.pi and (end < lowest or reaches < depth)
-        least, most = (turn, most) if fits else (least, turn)
+        radius = _radius(begin, turn, growth)
+        start, end = np.angle(radius), radius * np.exp(turn * growth)
+        reaches = np.abs(radius) * np.exp((lowest - start) * growth.real) * np.sin(lowest) - end.imag
+        fits = (0.0 < start) & (start + turn < np.pi) & ((start + turn < lowest) | (reaches < depth))
+        least, most = np.where(fits, turn, least), np.where(fits, most, turn)
     return least
-
-
-def _coefficient(
-    begin: np.ndarray, turn: float, slope: float, cohesion: float, friction: float, unit_weight: float
-) -> float:
-    """Horizontal over vertical acceleration by the spiral that turns by an angle from a point on the crest to the toe, the origin."""
-    ray, end = _spiral(begin, turn, friction)
-    spiral = ray * np.exp(np.linspace(0.0, turn, SAMPLES) * (np.tan(friction) + 1j))
-    x, y = spiral.real, -spiral.imag  # from the centre; the slope descends to the left
-    height = begin[1]
-    if np.any(y[1:-1] > np.minimum(y[0], y[-1] + np.tan(slope) * (x[1:-1] - x[-1])) + 1e-9 * height):
-        return IMPOSSIBLE
-    area, centroid = _polygon(np.append(x, x[-1] + height / np.tan(slope)), np.append(y, y[0]))
-    dissipation = cohesion * (abs(spiral[-1]) ** 2 - abs(ray) ** 2) / (2 * np.tan(friction))
-    # the mass turns to the left and downwards: its weight acts on the arm x, horizontal inertia to the left on the arm -y
-    return float((dissipation / (unit_weight * area) - centroid[0]) / -centroid[1])
-
-
-def _polygon(x: np.ndarray, y: np.ndarray) -> tuple[float, np.ndarray]:
-    """Area and centroid of a polygon."""
-    cross = x * np.roll(y, -1) - np.roll(x, -1) * y
-    area = 0.5 * cross.sum()
-    centroid = [((c + np.roll(c, -1)) * cross).sum() / (6 * area) for c in (x, y)]
-    return abs(float(area)), np.array(centroid)
