@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from typing import Any, NamedTuple, TypeVar
 
@@ -203,9 +203,9 @@ class CheckpointFile:
             if column.width and (name in there or not column.optional)
         }
 
-    def totals(self, widths: Mapping[str, int], rows: slice) -> Arrays:
+    def totals(self, names: Iterable[str], rows: slice) -> Arrays:
         """Totals of some ranks."""
-        return {name: self.rows(f"ranks/{name}", rows, width) for name, width in widths.items()}
+        return {name: self.rows(f"ranks/{name}", rows) for name in names}
 
     def cells(self, widths: Mapping[str, int]) -> Arrays:
         """Tables of the cells of this rank."""
