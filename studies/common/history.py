@@ -10,7 +10,7 @@ from mpi4py import MPI
 from mpm_core.row_file import RowFile
 
 
-class History:
+class History(RowFile):
     """Rows of a CSV file, each on disk as soon as it is added, and kept for plotting; a context manager.
 
     Example:
@@ -31,9 +31,9 @@ class History:
     def __init__(
         self, path: Path, columns: Sequence[str], comm: MPI.Comm = MPI.COMM_WORLD, *, keep_before: float | None = None
     ) -> None:
+        super().__init__(path, columns, comm, keep_before=keep_before)
         self.columns = list(columns)
-        self._file = RowFile(path, self.columns, comm, keep_before=keep_before)
-        self._rows: list[list[float]] = [[float(value) for value in row] for row in comm.bcast(self._file.kept)]
+        self._rows: list[list[float]] = [[float(value) for value in row] for row in comm.bcast(self.kept)]
 
     def add(self, **values: float) -> None:
         """Add a row. Collective.
@@ -47,7 +47,7 @@ class History:
         if set(values) != set(self.columns):
             raise ValueError(f"columns are {', '.join(values)}, expected {', '.join(self.columns)}")
         self._rows.append([float(values[name]) for name in self.columns])
-        self._file.add(self._rows[-1])
+        super().add(self._rows[-1])
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -56,9 +56,3 @@ class History:
         """Values of a column, one for each row."""
         k = self.columns.index(column)
         return np.array([row[k] for row in self._rows])
-
-    def __enter__(self) -> History:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._file.close()

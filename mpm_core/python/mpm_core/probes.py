@@ -15,7 +15,6 @@ Example:
 from __future__ import annotations
 
 import os
-from types import TracebackType
 from typing import Protocol
 
 import numpy as np
@@ -287,7 +286,7 @@ class TotalsProbe:
         }  # fmt: skip
 
 
-class ProbeFile:
+class ProbeFile(RowFile):
     """A CSV file with a row for each reading of a probe, on disk as soon as it was taken; a context manager.
 
     Args:
@@ -303,10 +302,10 @@ class ProbeFile:
     def __init__(self, path: str | os.PathLike[str], probe: Probe, *, keep: bool = False) -> None:
         self._probe = probe
         before = probe.model.time if keep else None
-        self._file = RowFile(path, list(probe.values()), probe.model.comm, keep_before=before)
+        super().__init__(path, list(probe.values()), probe.model.comm, keep_before=before)
 
     def __repr__(self) -> str:
-        return f"<ProbeFile: {self._file.path}, of {self._probe!r}>"
+        return f"<ProbeFile: {self.path}, of {self._probe!r}>"
 
     def record(self) -> None:
         """Read the probe, and add a row. Collective.
@@ -314,16 +313,4 @@ class ProbeFile:
         Raises:
             RunError: on all ranks, with path and reason, when the file cannot be written.
         """
-        self._file.add(list(self._probe.values().values()))
-
-    def close(self) -> None:
-        """Close the file; nothing can be recorded after that."""
-        self._file.close()
-
-    def __enter__(self) -> ProbeFile:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
+        self.add(list(self._probe.values().values()))

@@ -7,7 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from mpi4py import MPI
 
@@ -17,9 +17,11 @@ from .collective import on_first_rank, write_on_first_rank
 ROUNDING = 1e-8
 """Relative; more than that of times in the file, which have twelve digits."""
 
+T = TypeVar("T", bound="RowFile")
+
 
 class RowFile:
-    """Rows under one heading, each on disk as soon as it was added; the first rank writes.
+    """Rows under one heading, each on disk as soon as it was added; the first rank writes. A context manager.
 
     The file is begun as ``path.part`` and renamed when its first rows are on the disk: a run that is killed before that leaves
     an older file unchanged.
@@ -83,6 +85,12 @@ class RowFile:
                 self._file.close()
             except OSError:  # what could not be written was an error when it was added
                 pass
+
+    def __enter__(self: T) -> T:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
 
 
 def _rows_before(path: str, columns: list[str], time: float) -> list[list[str]]:
