@@ -28,7 +28,6 @@ from common.figures import Pictures
 from common.history import History
 from common.interrupt import Interrupt
 from common.movie import PORE, fem_frame, has_pore_pressure, particle_movie
-from common.notes import notes_of
 from common.options import add_choice, add_count, add_flag, add_number, add_switch, check, study_parser
 from common.output_options import add_output_options, add_picture_options, check_frames
 from common.page import Page
@@ -369,8 +368,7 @@ def main(arguments: list[str] | None = None) -> int:
             History(folder / "history.csv", COLUMNS, comm, keep_before=keep_before) as history,
             Files(case, folder) as files,
         ):
-            notes = notes_of(a.study, a.parameters(), a.restarts, start)
-            checkpoints = Checkpoints(case.model, folder / "checkpoint.h5", a.checkpoint_every, notes)
+            checkpoints = Checkpoints(case.model, folder, a, start)
             loop = slide(case, watch, history, files, interrupt, checkpoints)
         loop["stopped"] = loop["stopped"] or files.failure
         clock["slide"] = perf_counter()

@@ -22,7 +22,6 @@ from .figures import Pictures
 from .history import History
 from .interrupt import Interrupt
 from .movie import Movie, gathered, own_frame
-from .notes import notes_of
 from .options import Options, add_choice, add_count, add_number, add_switch
 from .output_options import add_output_options, add_picture_options, check_frames
 from .page import Page
@@ -113,9 +112,7 @@ def follow(
         Progress(a.study, until, comm) as progress,
     ):  # fmt: skip
         result = BodyRun(history)
-        checkpoints = Checkpoints(
-            model, folder / "checkpoint.h5", a.checkpoint_every, notes_of(a.study, a.parameters(), a.restarts, {})
-        )
+        checkpoints = Checkpoints(model, folder, a)
 
         def look(report: mpm.Report) -> None:
             history.add(**row(history, report))

@@ -15,6 +15,7 @@ import mpm_core as mpm
 
 from .notes import changes, restart_row
 from .options import Options, check
+from .parameters import plain_values
 
 
 def add_checkpoint_options(parser: argparse.ArgumentParser) -> None:
@@ -77,20 +78,22 @@ def _read(text: str) -> tuple[float, str]:
 
 
 class Checkpoints:
-    """The checkpoint file of a run, replaced whenever it is due.
+    """The checkpoint file of a run, ``checkpoint.h5`` in its folder, replaced whenever it is due.
 
     Args:
         model: what is saved.
-        path: of the file.
-        every: such as "500" (steps) or "5min", as the option gives it; None to save only by ``save``.
-        notes: kept in the file, see ``notes.py``.
+        options: of the run, which are kept in the file; without ``--checkpoint-every`` it is written only by ``save``.
+        start: results of the initial state for the summary, which are kept there too.
     """
 
-    def __init__(self, model: mpm.Model, path: Path, every: str | None, notes: Mapping[str, Any]) -> None:
-        self.path = path
-        self._notes = notes
+    def __init__(
+        self, model: mpm.Model, folder: Path, options: Options, start: Mapping[str, Any] | None = None
+    ) -> None:
+        self.path = folder / "checkpoint.h5"
+        self._notes = {"study": options.study, "options": plain_values(options.parameters()), "restarts": options.restarts,
+                       "start": start or {}}  # fmt: skip
         self._model = model
-        self._every = None if every is None else _read(every)
+        self._every = None if options.checkpoint_every is None else _read(options.checkpoint_every)
         self._last = self._now()
 
     def _now(self) -> float:

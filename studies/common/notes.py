@@ -33,18 +33,6 @@ def checkpoint_notes(path: Path, study: str, comm: MPI.Comm = MPI.COMM_WORLD) ->
     return {**notes, "time": description["time"], "steps": description["steps"]}
 
 
-def notes_of(
-    study: str, parameters: Sequence[Parameter], restarts: Sequence[Mapping], start: Mapping
-) -> dict[str, Any]:
-    """Notes in a checkpoint.
-
-    Args:
-        restarts: rows of earlier restarts.
-        start: results of the initial state for the summary.
-    """
-    return {"study": study, "options": plain_values(parameters), "restarts": list(restarts), "start": dict(start)}
-
-
 def changes(notes: Mapping[str, Any], parameters: Sequence[Parameter]) -> dict[str, tuple[Any, Any]]:
     """Options that differ from those in the notes: name to the value there and the value now."""
     before, now = notes["options"], plain_values(parameters)

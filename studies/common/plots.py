@@ -186,7 +186,6 @@ def save_history(
     label: str,
     *,
     limits: tuple[float, float] | None = None,
-    markers: Sequence[tuple[float, float, str]] = (),
     dashed: Sequence[str] = (),
 ) -> None:
     """Draw curves over time.
@@ -196,19 +195,16 @@ def save_history(
         curves: values by name; the names form a legend if there are several.
         label: of the vertical axis, with unit.
         limits: of the vertical axis.
-        markers: single points to compare with: time, value, name.
         dashed: names of curves in dashes, so that one below that coincides with it is seen.
     """
     with curve_figure(path, (4.6, 3.0)) as axes:
         for k, (name, values) in enumerate(curves.items()):
             style = "--" if name in dashed else "-"
             axes.plot(time, values, style, color=CURVES[k % len(CURVES)], label=name)
-        for t, value, name in markers:
-            axes.plot(t, value, "o", color="black", markersize=4, markerfacecolor="white", label=name)
         axes.set(xlabel="Time [s]", ylabel=label, xlim=(0, max(float(np.max(time, initial=0.0)), 1e-12)))
         if limits:
             axes.set_ylim(*limits)
-        if len(curves) + len(markers) > 1:
+        if len(curves) > 1:
             axes.legend()
 
 
