@@ -13,27 +13,21 @@ namespace mpm::parallel
 /// @note Collective
 std::string shared_failure(MPI_Comm comm, const std::string& failure);
 
-/// The text of the InputError that something raises; empty if it raises none.
+/// Does something that concerns this rank only; when it raises an InputError on any rank, all ranks raise it.
+/// @note Collective; `work` must not be
 template <class F>
-std::string input_error_of(F&& work)
+void collectively(MPI_Comm comm, F&& work)
 {
+  std::string failure;
   try
   {
     work();
   }
   catch (const InputError& error)
   {
-    return error.what();
+    failure = error.what();
   }
-  return {};
-}
-
-/// Does something that concerns this rank only; when it raises an InputError on any rank, all ranks raise it.
-/// @note Collective; `work` must not be
-template <class F>
-void collectively(MPI_Comm comm, F&& work)
-{
-  if (const std::string text = shared_failure(comm, input_error_of(work)); !text.empty())
+  if (const std::string text = shared_failure(comm, failure); !text.empty())
     throw InputError(text);
 }
 } // namespace mpm::parallel

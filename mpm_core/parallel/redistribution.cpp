@@ -7,18 +7,15 @@ namespace mpm::parallel
 {
 namespace
 {
-using Lists = std::vector<std::vector<GlobalIndex>>;
-
 /// Ranks that send particles to this one or take some from it, by rising rank.
 std::vector<int> partners(const NodeExchange& exchange, const std::vector<MigratingParticle>& migrating)
 {
-  Lists counts(static_cast<std::size_t>(exchange.size));
+  std::vector<int> sends(static_cast<std::size_t>(exchange.size), 0), takes(sends), ranks;
   for (const MigratingParticle& migrant : migrating)
-    counts[static_cast<std::size_t>(migrant.rank)].resize(1, 1);
-  const Lists received = exchange_lists(counts, exchange.comm);
-  std::vector<int> ranks;
-  for (std::size_t r = 0; r < counts.size(); ++r)
-    if (!counts[r].empty() || !received[r].empty())
+    sends[static_cast<std::size_t>(migrant.rank)] = 1;
+  MPI_Alltoall(sends.data(), 1, MPI_INT, takes.data(), 1, MPI_INT, exchange.comm);
+  for (std::size_t r = 0; r < sends.size(); ++r)
+    if (sends[r] || takes[r])
       ranks.push_back(static_cast<int>(r));
   return ranks;
 }
