@@ -19,35 +19,7 @@ py::array_t<double> table_array(const Table& table)
   return py::array_t<double>(shape, table.values.data());
 }
 
-/// The fields of particles that there are, (n,) or (n, k); cells by their numbers over all ranks.
-template <class G, int D = G::dim>
-py::dict particle_arrays(const Model<G>& model)
-{
-  py::dict arrays;
-  const std::size_t n = model.particles.id.size();
-  const auto add = [&](const Field& field, const auto& columns)
-  {
-    const auto all = columns_of(columns);
-    const py::str name(std::string(field.name));
-    if constexpr (std::is_same_v<const Column&, decltype(all[0])>)
-    {
-      if (is_present(columns) && all.size() > 0)
-        arrays[name] = all.size() == 1 ? py::object(copied(all[0])) : py::object(rows(all, n, {}));
-    }
-    else
-    {
-      std::vector<std::int64_t> values(all[0].begin(), all[0].end());
-      if (field.name == "cell")
-        for (auto& value : values)
-          value = model.mesh.global_cells[static_cast<std::size_t>(value)];
-      arrays[name] = copied(values);
-    }
-  };
-  for_each_field(model.particles, add);
-  return arrays;
-}
-
-/// All arrays of a checkpoint that have rows of this rank, in groups.
+/// Arrays of a checkpoint that have rows of this rank, beside those of the particles, in groups.
 /// @note Collective
 template <class G, int D = G::dim>
 py::dict checkpoint_arrays(Model<G>& model)
@@ -59,7 +31,7 @@ py::dict checkpoint_arrays(Model<G>& model)
   for (const Table& table : rank_state(model))
     ranks[py::str(table.name)] = table_array(table);
   using namespace py::literals;
-  return py::dict("particles"_a = particle_arrays(model), "cells"_a = cells, "ranks"_a = ranks);
+  return py::dict("cells"_a = cells, "ranks"_a = ranks);
 }
 
 /// The tables that a checkpoint of the model may have, by name, in groups: widths of those of cells; of those of ranks,

@@ -42,12 +42,26 @@ _MOVED_CORNERS = "moved_corners"
 
 def save(model: Model, path: str | os.PathLike[str], notes: Mapping[str, Any] | None = None) -> None:
     """See `Model.save`."""
-    groups = _core.checkpoint_arrays(model._core)
+    groups = {**_core.checkpoint_arrays(model._core), "particles": _particle_arrays(model)}
     sums = _sums(_all_rows(model.comm, groups["ranks"]))
     text = collectively(model.comm, lambda: _text({**_description(model), "sums": sums}, notes))
     if model.repartitions > 0:
         groups["cells"][_OWNED_CELLS] = _own_cells(model).astype(np.float64)
     write_file(os.fspath(path), model.comm, text, groups)
+
+
+def _particle_arrays(model: Model) -> Arrays:
+    """The fields that the particles of any rank have, (n,) or (n, k); cells by their numbers over all ranks. Collective."""
+    schedule = [field for field in model.particles.schedule() if field["components"]]
+    arrays = {field["name"]: model._core.column(field["name"], None) for field in schedule}
+    arrays["cell"] = model.mesh.global_cells[arrays["cell"]]
+    arrays["material"] = arrays["material"].astype(np.int64)
+    n = len(arrays["id"])
+    here = {field["name"] for field in schedule if not field["optional"] or 0 < n == len(arrays[field["name"]])}
+    there = here.union(*model.comm.allgather(here))
+    return {
+        name: values.ravel() if values.shape[1:] == (1,) else values for name, values in arrays.items() if name in there
+    }
 
 
 def _all_rows(comm: MPI.Comm, ranks: Arrays) -> Arrays:
