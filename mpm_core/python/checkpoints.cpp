@@ -136,7 +136,7 @@ std::string misplaced(const Mesh<D>& mesh, const Particles<D>& particles)
 
 /// Replaces particles and state of a model by those of a file, whose values have been checked.
 /// @param particles   fields of all that the file has; of this rank, or of an equal part where the partition is another
-/// @param ranks       of this rank; of all ranks of the file where the partition is another; see check_totals_of
+/// @param ranks       of this rank; of all ranks of the file where the partition is another
 /// @param owners      rank that owns the cell of each of these particles; None where the partition is that of the file
 /// @throws RunError on all ranks, with path and reason: a particle is not in its cell; the model is then as before
 /// @note Collective

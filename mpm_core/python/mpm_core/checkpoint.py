@@ -206,13 +206,11 @@ def _require_totals(path: str, totals: Arrays, tables: dict[str, Any], there: di
     for name, (most_count, is_positive, may_be_unknown) in tables.items():
         rows, most = totals[name], min(most_count, _MOST_EXACT)
         if most > 0:
-            good, expected = (rows >= 0) & (rows <= most) & (
-                rows == np.floor(rows)
-            ), f"a whole number from 0 to {most:.0f}"
+            good = (rows >= 0) & (rows <= most) & (rows == np.floor(rows))
+            expected = f"a whole number from 0 to {most:.0f}"
         else:
-            good = (np.abs(rows) < _MOST_TOTAL) & (rows >= (0 if is_positive else -np.inf)) | (
-                may_be_unknown & np.isnan(rows)
-            )
+            known = (np.abs(rows) < _MOST_TOTAL) & (rows >= (0 if is_positive else -np.inf))
+            good = known | (may_be_unknown & np.isnan(rows))
             expected = "a number from 0 on" if is_positive else "a finite number"
         for value in rows[~good]:
             raise RunError(f"cannot read /ranks/{name} in {path}: it has the value {value:f}, expected {expected}")
