@@ -13,7 +13,7 @@ log=$build/setup.log
 # own, factorises matrices some ten times as fast as the BLAS that is there by default.
 packages=(cmake ninja-build g++ git libopenmpi-dev openmpi-bin libptscotch-dev libeigen3-dev pybind11-dev
   python3-dev libgtest-dev libgmock-dev python3-dolfinx python3-gmsh gmsh python3-mpi4py python3-petsc4py
-  python3-numpy python3-h5py libopenblas0-serial python3-matplotlib python3-pil python3-tqdm python3-jinja2
+  python3-numpy python3-h5py libopenblas0-serial python3-matplotlib python3-pil python3-tqdm python3-jinja2 python3-scipy
   python3-rasterio ffmpeg)
 # What the tests need besides.
 test_packages=(gfortran python3-pytest python3-pytest-xdist python3-hypothesis python3-meshio python3-pandas python3-scipy

@@ -16,7 +16,7 @@ from talus.begin import begin
 from talus.completion import SCRIPTS
 from talus.launch import run
 
-NEEDED = ("dolfinx", "h5py", "matplotlib", "PIL", "tqdm", "jinja2")
+NEEDED = ("dolfinx", "h5py", "matplotlib", "PIL", "tqdm", "jinja2", "scipy")
 """Modules without which a study ends while it is imported"""
 
 

@@ -15,13 +15,14 @@ from mpm_core.output import PARTICLE_FIELDS, ModelOutput
 from mpm_core.probes import ProbeFile
 
 import mpm_core as mpm
+from particle_player import Movie
 
 from .animation import film_frames, save_animation
 from .checkpoint import Checkpoints, add_checkpoint_options, numbered
 from .figures import Pictures
 from .history import History
 from .interrupt import Interrupt
-from .movie import Movie, gathered, own_frame
+from .movie import gathered, own_frame
 from .options import Options, add_choice, add_count, add_number, add_switch
 from .output_options import add_output_options, add_picture_options, check_frames
 from .page import Page
