@@ -16,17 +16,16 @@ from functools import partial
 from pathlib import Path
 from time import perf_counter
 
-import matplotlib.pyplot as plt
 import numpy as np
 from common import body_runs
 from common.body_runs import BodyRun, follow
 from common.checkpoint import check_restart
 from common.checks import check_cells
-from common.figures import Pictures, save_figure
+from common.figures import Pictures, curve_figure
 from common.history import History
 from common.movie import QUANTITIES, WET_QUANTITIES, particle_movie
 from common.options import add_number, check, study_parser
-from common.plots import CURVES, Scene, colour_limits, paper_style, save_particles
+from common.plots import CURVES, Scene, colour_limits, save_particles
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
@@ -180,8 +179,7 @@ def row(a: Namespace, model: mpm.Model, _: History, report: mpm.Report) -> dict[
 
 def draw_course(path: Path, history: History) -> None:
     """Ways of front and crest, and mean pore pressure over total vertical stress, over time."""
-    with paper_style():
-        figure, (above, below) = plt.subplots(2, 1, figsize=(4.6, 4.2), sharex=True, layout="constrained")
+    with curve_figure(path, (4.6, 4.2), rows=2) as (above, below):
         above.plot(history["time_s"], history["runout_m"], color=CURVES[0], label="front, forwards")
         above.plot(history["time_s"], history["crest_settlement_m"], color=CURVES[2], label="crest, downwards")
         above.legend(fontsize=8)
@@ -190,10 +188,6 @@ def draw_course(path: Path, history: History) -> None:
         below.set(
             xlabel="Time [s]", ylabel="Mean pore pressure over\ntotal vertical stress [-]", xlim=(0, None), ylim=(0, 1)
         )
-        for axes in (above, below):
-            axes.tick_params(top=True, right=True)
-            axes.grid(linewidth=0.3, color="#d0d0d0")
-        save_figure(figure, path, dpi=200)
 
 
 def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> Pictures:

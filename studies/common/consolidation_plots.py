@@ -18,7 +18,7 @@ from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 from .animation import save_figure_film
 from .field_plots import Field
-from .figures import save_figure
+from .figures import curve_figure, save_figure
 from .plots import CURVES, ROUND_TICKS, Quantity, paper_style
 
 EXCESS = Quantity("Excess pore pressure", "kPa", scale=1e-3, colours="viridis")
@@ -55,7 +55,7 @@ class ExcessScale:
 def save_excess(path: Path, pictures: Sequence[ExcessPicture]) -> None:
     """Draw panels with one scale, side by side where the ground is higher than wide."""
     with paper_style():
-        save_figure(_excess_figure(pictures, ExcessScale.of(pictures)), path, bbox_inches="tight", pad_inches=0.06)
+        save_figure(_excess_figure(pictures, ExcessScale.of(pictures)), path)
 
 
 def save_excess_film(path: Path, pictures: Sequence[ExcessPicture]) -> Path:
@@ -112,8 +112,7 @@ def save_isochrones(
         x: of the line [m].
         particles: for each picture heights [m] and excess pressures [Pa] of particles next to the line, drawn as marks.
     """
-    with paper_style():
-        figure, axes = plt.subplots(figsize=(4.9, 3.6), layout="constrained")
+    with curve_figure(path, (4.9, 3.6)) as axes:
         for colour, picture in zip(cycle(CURVES), pictures):
             field = picture.excess
             low, high = field.points.min(axis=0), field.points.max(axis=0)
@@ -129,10 +128,7 @@ def save_isochrones(
         axes.set_title(
             f"$x$ = {x:g} m" + (": elements (lines), particles (dots)" if particles else ""), loc="left", pad=4
         )
-        axes.tick_params(top=True, right=True)
-        axes.grid(linewidth=0.3, color="#d0d0d0")
         axes.legend(fontsize=8)
-        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)
 
 
 def save_over_time(
@@ -147,8 +143,7 @@ def save_over_time(
 
     downward: with the vertical axis turned over, as for settlements
     """
-    with paper_style():
-        figure, axes = plt.subplots(figsize=(4.9, 3.3), layout="constrained")
+    with curve_figure(path, (4.9, 3.3)) as axes:
         for colour, (name, values) in zip(cycle(CURVES), curves.items()):
             axes.semilogx(
                 days, values, "-" if particles else "o-", color=colour, markersize=2.5, linewidth=1.1, label=name
@@ -158,10 +153,7 @@ def save_over_time(
                 days, values, "o", color=colour, markersize=3.5, markerfacecolor="none", label=f"{name}, particles"
             )
         axes.set(xlabel="Time [days]", ylabel=label)
-        axes.tick_params(top=True, right=True, which="both")
-        axes.grid(linewidth=0.3, color="#d0d0d0")
         if downward:
             axes.invert_yaxis()
         if len(curves) > 1 or particles:
             axes.legend(fontsize=8)
-        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)

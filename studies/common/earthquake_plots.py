@@ -7,20 +7,13 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.collections import EllipseCollection, PolyCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 
-from .figures import save_figure
-from .plots import CURVES, WIDTH, Quantity, colour_limits, disc_diameter, draw_bar, paper_style
+from .figures import curve_figure, save_figure
+from .plots import CURVES, WIDTH, Quantity, colour_limits, discs, draw_bar, paper_style
 
 Curve = tuple[np.ndarray, np.ndarray]
-
-
-def _panel(axes: plt.Axes, label: str) -> None:
-    axes.set_ylabel(label)
-    axes.tick_params(top=True, right=True)
-    axes.grid(linewidth=0.3, color="#d0d0d0")
-    axes.margins(x=0)
 
 
 def _integral(time: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -42,47 +35,40 @@ def save_record(path: Path, time: np.ndarray, acceleration: np.ndarray, velocity
         ("Velocity [m/s]", raw, velocity),
         ("Displacement [m]", _integral(time, raw), _integral(time, velocity)),
     )
-    with paper_style():
-        figure, axes = plt.subplots(3, 1, figsize=(WIDTH, 4.6), sharex=True, layout="constrained")
+    with curve_figure(path, (WIDTH, 4.6), rows=3) as axes:
         for panel, (label, before, after) in zip(axes, rows):
             panel.plot(time, before, color="#b0b0b0", linewidth=1.0, label="before baseline correction")
             panel.plot(time, after, color=CURVES[0], linewidth=0.9, label="after baseline correction")
-            _panel(panel, label)
+            panel.set(ylabel=label, xmargin=0)
         axes[0].legend(ncols=2, loc="upper right", fontsize=8)
         axes[-1].set_xlabel("Time [s]")
-        figure.align_ylabels(axes)
-        save_figure(figure, path)
+        axes[0].figure.align_ylabels(axes)
 
 
 def save_motions(path: Path, accelerations: Mapping[str, Curve], displacements: Mapping[str, Curve]) -> None:
     """Accelerations [m/s2] above and displacements [m] below, over time [s], by name."""
-    with paper_style():
-        figure, axes = plt.subplots(2, 1, figsize=(WIDTH, 4.6), sharex=True, layout="constrained")
+    with curve_figure(path, (WIDTH, 4.6), rows=2) as axes:
         for panel, curves, label in zip(
             axes, (accelerations, displacements), ("Acceleration [m/s²]", "Displacement [m]")
         ):
             for k, (name, (time, values)) in enumerate(curves.items()):
                 panel.plot(time, values, color=CURVES[k], linewidth=0.9, label=name)
-            _panel(panel, label)
+            panel.set(ylabel=label, xmargin=0)
             low, high = panel.get_ylim()
             panel.set_ylim(low, high + 0.4 * (high - low))  # space for the names above the curves
             panel.legend(fontsize=8, loc="upper left")
         axes[-1].set_xlabel("Time [s]")
-        figure.align_ylabels(axes)
-        save_figure(figure, path)
+        axes[0].figure.align_ylabels(axes)
 
 
 def save_amplification(path: Path, exact: Curve, found: Mapping[str, Curve]) -> None:
     """Ratios of spectra over frequency [Hz]: the closed form in black, and what was found by name."""
-    with paper_style():
-        figure, axes = plt.subplots(figsize=(5.2, 3.4), layout="constrained")
+    with curve_figure(path, (5.2, 3.4)) as axes:
         for k, (name, (frequency, ratio)) in enumerate(found.items()):
             axes.plot(frequency, ratio, color=CURVES[k], linewidth=2.2 if k == 0 else 1.0, label=name)
         axes.plot(*exact, "--", color="black", linewidth=0.9, label="linear layers, closed form")
-        axes.set(xlabel="Frequency [Hz]", ylim=(0, None))
-        _panel(axes, "Amplification (surface over outcrop) [-]")
+        axes.set(xlabel="Frequency [Hz]", ylabel="Amplification (surface over outcrop) [-]", ylim=(0, None), xmargin=0)
         axes.legend(fontsize=8)
-        save_figure(figure, path)
 
 
 def save_ground(path: Path, frame: Mapping[str, np.ndarray], name: str, quantity: Quantity) -> None:
@@ -105,13 +91,8 @@ def save_ground(path: Path, frame: Mapping[str, np.ndarray], name: str, quantity
             2, 1, figsize=(WIDTH, height), height_ratios=(height - 0.9, 0.12), layout="constrained"
         )
         cells = PolyCollection(corners[rest], edgecolors="face", array=values[rest], **look)
-        diameter = disc_diameter(frame["volume"][~rest])
-        discs = EllipseCollection(
-            diameter, diameter, np.zeros(len(diameter)), units="xy", offsets=frame["position"][~rest],
-            transOffset=axes.transData, array=values[~rest], **{**look, "linewidths": 0},
-        )  # fmt: skip
-        for collection in (cells, discs):
-            axes.add_collection(collection)
+        axes.add_collection(cells)
+        discs(axes, frame["position"][~rest], frame["volume"][~rest], array=values[~rest], **{**look, "linewidths": 0})
         margin = 0.02 * (high - low)[0]
         axes.set(aspect="equal", xlabel="$x$ [m]", ylabel="$y$ [m]", xlim=(low[0] - margin, high[0] + margin),
                  ylim=(low[1] - margin, high[1] + margin))  # fmt: skip

@@ -255,7 +255,7 @@ def save_mechanism(
         panels[0][0].set_title(title, loc="left", pad=4)
         if line is not None:
             panels[1][0].legend(loc="lower right", bbox_to_anchor=(1.02, 0.98), fontsize=9)
-        _save(figure, path)
+        save_figure(figure, path)
 
 
 def _arrows(axes: Axes, field: Field, lower: np.ndarray, upper: np.ndarray) -> None:
@@ -323,7 +323,7 @@ def save_side_by_side(
             bar = figure.colorbar(ScalarMappable(Normalize(*ends), quantity.colours), ax=below, location="bottom", ticks=ticks,
                                   shrink=0.8, aspect=20 * len(below), extend="max")  # fmt: skip
             bar.set_label(label)
-        _save(figure, path)
+        save_figure(figure, path)
 
 
 def _panels(
@@ -350,7 +350,3 @@ def _bar(figure: Figure, axes: Axes, quantity: Quantity, limits: tuple[float, fl
                           extend=extend)  # fmt: skip
     bar.set_label(quantity.label, labelpad=2, fontsize=8)
     bar.outline.set_linewidth(0.5)
-
-
-def _save(figure: Figure, path: Path) -> None:
-    save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)

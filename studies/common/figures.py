@@ -40,15 +40,11 @@ def _where(error: BaseException) -> str:
     return f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}" if trace is not None else "unknown"
 
 
-def save_figure(figure: Figure, path: Path, **look: object) -> None:
-    """Write a picture and close the figure. If that fails, the run records the reason and continues without it.
-
-    Args:
-        look: as of ``Figure.savefig``.
-    """
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a picture and close the figure. If that fails, the run records the reason and continues without it."""
     try:
         with expendable(path) as aside:
-            figure.savefig(aside, format=path.suffix[1:], **look)  # type: ignore[arg-type]
+            figure.savefig(aside, format=path.suffix[1:])
     except Exception as error:  # as in `draw_pictures`; also for studies that draw while they run
         _note(path.name, error)
     finally:
@@ -61,15 +57,15 @@ def paper_style() -> AbstractContextManager[None]:
 
 
 @contextmanager
-def curve_figure(path: Path, size: tuple[float, float] = (4.6, 3.2), panels: int = 1) -> Iterator[Any]:
+def curve_figure(path: Path, size: tuple[float, float] = (4.6, 3.2), panels: int = 1, rows: int = 1) -> Iterator[Any]:
     """Axes for curves, with a grid and ticks on all sides; in the end the picture is written, see `save_figure`.
 
     Args:
         path: of the picture.
         size: width and height [inches].
-        panels: axes side by side; of one the axes are given, of several an array of them.
+        panels: axes side by side; rows: axes above one another, over one horizontal axis. Several are given as an array.
     """
     with paper_style(), plt.rc_context({"axes.grid": True, "xtick.top": True, "ytick.right": True}):
-        figure, axes = plt.subplots(1, panels, figsize=size, layout="constrained")
+        figure, axes = plt.subplots(rows, panels, figsize=size, sharex=rows > 1, layout="constrained")
         yield axes
-        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)
+        save_figure(figure, path)

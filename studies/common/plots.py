@@ -156,7 +156,7 @@ def save_particles(
             )
         axes.set_title(title, loc="left", pad=4)
         draw_bar(figure, bar_axes, quantity, limits, has_less=limits[0] != 0.0)
-        _save(figure, path)
+        save_figure(figure, path)
 
 
 def save_mesh(path: Path, scene: Scene, position: np.ndarray, volume: np.ndarray) -> None:
@@ -176,7 +176,7 @@ def save_mesh(path: Path, scene: Scene, position: np.ndarray, volume: np.ndarray
             loc="left",
             pad=4,
         )
-        _save(figure, path)
+        save_figure(figure, path)
 
 
 def save_history(
@@ -206,7 +206,3 @@ def save_history(
             axes.set_ylim(*limits)
         if len(curves) > 1:
             axes.legend()
-
-
-def _save(figure: Figure, path: Path) -> None:
-    save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)

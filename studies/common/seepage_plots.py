@@ -96,7 +96,7 @@ def save_flow(path: Path, pictures: Sequence[FlowPicture], quantity: Quantity = 
     """Draw a panel for each flow, above one another, with one scale of the quantity."""
     with paper_style():
         figure = _figure(pictures, quantity, _scales(pictures, quantity))
-        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)
+        save_figure(figure, path)
 
 
 def save_flow_film(path: Path, pictures: Sequence[FlowPicture], quantity: Quantity = HEAD) -> Path:

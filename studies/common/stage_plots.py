@@ -19,7 +19,7 @@ import fenics_bridge as bridge
 from particle_player import axis_labels, boundary_edges
 
 from .field_plots import Field, gathered
-from .figures import Pictures, curve_figure
+from .figures import Pictures, curve_figure, save_figure
 from .plots import CURVES, Quantity, paper_style
 
 MOVED = Quantity("Displacement", "mm", scale=1e3, colours="viridis")
@@ -89,8 +89,7 @@ def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) 
         bar = figure.colorbar(ScalarMappable(Normalize(*limits), quantity.colours), ax=panels[:, 0].tolist(), shrink=0.6,
                               extend="max", pad=0.01)  # fmt: skip
         bar.set_label(quantity.label)
-        figure.savefig(path)
-        plt.close(figure)
+        save_figure(figure, path)
 
 
 def save_over_stages(path: Path, names: Sequence[str], curves: dict[str, Sequence[float]], label: str) -> None:

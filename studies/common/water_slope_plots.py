@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 from .field_plots import Field, mechanism_field, save_mechanism
-from .figures import Pictures, save_figure
-from .plots import CURVES, paper_style
+from .figures import Pictures, curve_figure
+from .plots import CURVES
 from .seepage_plots import MOST_PANELS, PRESSURE, SATURATION, dries, save_flow, save_flow_film
 from .water_site import DAY, in_days
 from .water_slopes import Instant, lowest
@@ -55,8 +54,7 @@ def save_factors(path: Path, instants: Sequence[Instant], limits: Mapping[str, f
     """The factor of safety over time, with lines for its limits and for 1."""
     days = np.array([instant.time for instant in instants]) / DAY
     factors = np.array([instant.safety.value for instant in instants])
-    with paper_style():
-        figure, axes = plt.subplots(figsize=(4.9, 3.3), layout="constrained")
+    with curve_figure(path, (4.9, 3.3)) as axes:
         axes.plot(days, factors, "o-", color=CURVES[0], markersize=3, label="transient flow")
         for k, (name, value) in enumerate(limits.items()):
             axes.axhline(value, color=CURVES[k + 1], linestyle=("--", "-.", ":")[k % 3], linewidth=1.1, label=name)
@@ -65,7 +63,4 @@ def save_factors(path: Path, instants: Sequence[Instant], limits: Mapping[str, f
         margin = 0.08 * (max(every) - min(every))
         axes.set(xlabel="Time [days]", ylabel="Factor of safety [-]", xlim=(0, days[-1] or 1.0),
                  ylim=(min(every) - margin, max(every) + margin))  # fmt: skip
-        axes.tick_params(top=True, right=True)
-        axes.grid(linewidth=0.3, color="#d0d0d0")
         axes.legend(fontsize=8)
-        save_figure(figure, path, bbox_inches="tight", pad_inches=0.06)

@@ -47,7 +47,7 @@ def save_errors(path: Path, rows: Sequence[Mapping], title: str) -> None:
         shown += [Line2D([], [], color="black", linestyle=line, linewidth=1.1, label=f"$\\nu$ = {poisson:.9g}")
                   for poisson, line in zip(poissons, LINES)]  # fmt: skip
         figure.legend(handles=shown, loc="lower center", ncols=4, fontsize=8, columnspacing=1.5, handlelength=2.4)
-        save_figure(figure, path, dpi=150)
+        save_figure(figure, path)
 
 
 def _errors(axes: Axes, rows: Sequence[Mapping], poissons: Sequence[float]) -> None:
@@ -101,4 +101,4 @@ def save_pressures(path: Path, fields: Mapping[str, Field], unit: tuple[float, s
         bar = figure.add_axes((0.25, 0.5 / total, 0.5, 0.11 / total))
         draw_bar(figure, bar, quantity, limits)
         bar.set_xlabel(f"{quantity.label}; {title}", labelpad=2)
-        save_figure(figure, path, dpi=150)
+        save_figure(figure, path)

@@ -157,4 +157,4 @@ def draw_variants(path, slides):
             bar = figure.add_axes((box.x0, 0.045, box.width, 0.008))
             draw_bar(figure, bar, quantity, limits, has_less=limits[0] != 0.0)
             bar.set_xticks(np.linspace(*limits, 3))
-        save_figure(figure, path, dpi=200)
+        save_figure(figure, path)
