@@ -30,16 +30,19 @@ Index find_cell_in_bins(const Mesh<D>& mesh, const Vector<D>& x)
     const Index k = std::clamp(static_cast<Index>(at), Index(0), bins.counts[i] - 1);
     bin = bin * static_cast<std::size_t>(bins.counts[i]) + static_cast<std::size_t>(k);
   }
-  const double tolerance = inside_tolerance_of(mesh);
-  Index found = none;
+  Index best = none;
+  double best_value = -inside_tolerance_of(mesh);
   for (Index j = bins.offsets[bin]; j < bins.offsets[bin + 1]; ++j)
   {
     const Index c = bins.cells[static_cast<std::size_t>(j)];
-    const bool is_higher = found == none || mesh.global_cells[c] > mesh.global_cells[found];
-    if (is_higher && smallest<D>(mesh.shapes[c], x).first >= -tolerance)
-      found = c;
+    const double value = smallest<D>(mesh.shapes[c], x).first;
+    if (value >= best_value && (best == none || value > best_value))
+    {
+      best = c;
+      best_value = value;
+    }
   }
-  return found;
+  return best;
 }
 
 template <int D>

@@ -39,8 +39,7 @@ Location walk_to_cell(const Mesh<D>& mesh, const Vector<D>& x, Index start);
 template <int D>
 Location find_cell(const Mesh<D>& mesh, const Vector<D>& x, Index start);
 
-/// The cell of point x without a guess, by the bins of the mesh; `none` when outside. A point on a side belongs to the
-/// cell with the highest number over all ranks, on any partition.
+/// The cell of point x without a guess, by the bins of the mesh; `none` when outside.
 template <int D>
 Index find_cell_in_bins(const Mesh<D>& mesh, const Vector<D>& x);
 } // namespace mpm::mesh

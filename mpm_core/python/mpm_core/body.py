@@ -189,22 +189,19 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
             if (v <= 0).any():
                 raise InputError(f"volumes is {v.min()} m^{self.mesh.dim} at least, expected positive numbers")
             rho = positive("density", density, "kg/m3")
-            rows = np.flatnonzero((own == highest) & (own >= 0))
+            rows = np.flatnonzero(inside.argmax(axis=0) == self.comm.rank)
             return self._core.seed_points(x[rows], v[rows], self._next_id + rows, self._material(material), rho)
 
-        own = collectively(self.comm, lambda: self._own_cells_of(points))
-        highest = np.array(self.comm.allgather(own)).max(axis=0)  # at a corner, cells of several ranks hold a point
-        if (highest < 0).any():
-            first = int(np.argmax(highest < 0))
+        # By rank and point: one on a side between the cells of two ranks is in both, and the first rank has it.
+        inside = np.array(self.comm.allgather(collectively(self.comm, lambda: self._owned(points))))
+        if not inside.any(axis=0).all():
+            first = int(np.argmin(inside.any(axis=0)))
             raise InputError(f"points has {np.asarray(points)[first]} at row {first}, which is outside of the mesh")
         return self._seeded(collectively(self.comm, place), len(np.asarray(points)))
 
-    def _own_cells_of(self, points: ArrayLike) -> NDArray[np.int64]:
-        """Number over all ranks of the cell of each point; -1 where this rank does not own it."""
+    def _owned(self, points: ArrayLike) -> Any:
         cells = self.mesh.cells_of(points)
-        numbers, own = np.full(len(cells), -1), (cells >= 0) & (cells < self.mesh.owned_cells)
-        numbers[own] = self.mesh.global_cells[cells[own]]
-        return numbers
+        return (cells >= 0) & (cells < self.mesh.owned_cells)
 
     def traction(self, facet_tag: Tag, traction: ArrayLike) -> float:
         """Load the particles next to the facets with a tag (15). The force moves with them and keeps its direction.
