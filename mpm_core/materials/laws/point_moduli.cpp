@@ -32,7 +32,12 @@ struct DiffersByPoint
     return false;
   }
   bool operator()(const CamClay&) const { return true; }
-  bool operator()(const Heterogeneous&) const { return true; }
+  bool operator()(const Heterogeneous& law) const
+  {
+    const auto is_elastic = [](const std::string& name)
+    { return name == "young" || name == "poisson" || name == "p_wave_modulus"; };
+    return std::ranges::any_of(law.varying, is_elastic) || std::visit(*this, law.law);
+  }
   bool operator()(const Hencky& law) const { return std::visit(*this, law.law); }
   bool operator()(const Undrained& law) const { return std::visit(*this, law.skeleton); }
 };
