@@ -198,7 +198,7 @@ def save_kinds(path: Path, run: dict) -> None:
         x, y = frame["position"][~rest].T
         axes.scatter(x, y, c=strain[~rest], s=1.2, lw=0, norm=norm, cmap=SHEAR_STRAIN.colours)
         axes.set_title(f"$t$ = {frame['time']:.2f} s", loc="left", pad=4)
-        draw_bar(figure, bar_axes, SHEAR_STRAIN, (norm.vmin, norm.vmax), has_less=False)
+        draw_bar(figure, bar_axes, SHEAR_STRAIN, (norm.vmin, norm.vmax))
         save_figure(figure, path)
 
 

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from common.animation import film_frames, save_animation
+from common.animation import save_animation
 from common.checks import check_cells, check_effect, check_file, check_whole
 from common.earthquake_plots import save_amplification, save_ground, save_motions, save_record
 from common.earthquake_site import (
@@ -263,7 +263,7 @@ def drawn(a: Namespace, folder: Path, record: tuple, history: History, slips: di
     }  # fmt: skip
     if a.film:
         pictures["earthquake"] = partial(
-            save_animation, folder / "earthquake", scene, film_frames(frames), SHEAR_STRAIN
+            save_animation, folder / "earthquake", scene, frames, "shear_strain", SHEAR_STRAIN
         )
     return pictures
 

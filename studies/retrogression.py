@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from common.animation import film_frames, save_animation
+from common.animation import save_animation
 from common.figures import Pictures, curve_figure
 from common.history import History
 from common.interrupt import Interrupt
@@ -191,8 +191,8 @@ def drawn(a: Namespace, result: Slide, scene: Scene | None, folder: Path) -> Pic
                              last["displacement"], DISPLACEMENT, title=f"$t$ = {last['time']:.1f} s")  # fmt: skip
     if a.film:
         name = f"retrogression_{size:g}".replace(".", "_")  # what follows a point would be taken for the suffix
-        frames = film_frames(result.frames)
-        pictures[name] = partial(save_animation, folder / name, scene, frames, SHEAR_STRAIN, limits=(0, 2))
+        pictures[name] = partial(save_animation, folder / name, scene, result.frames, "shear_strain", SHEAR_STRAIN,
+                                 limits=(0, 2))  # fmt: skip
     return pictures
 
 

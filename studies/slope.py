@@ -20,7 +20,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from common.animation import film_frames, save_animation
+from common.animation import save_animation
 from common.checkpoint import Checkpoints, add_checkpoint_options, check_restart, numbered
 from common.checks import check_effect
 from common.ensemble import Ensemble, further_members
@@ -308,7 +308,7 @@ def drawn(a: Namespace, scene: Scene | None, frames: list[dict], history: Histor
             limits=(0, max(0.5, 1.05 * crest.max()))),
     }  # fmt: skip
     if a.film:
-        pictures["film"] = lambda: save_animation(folder / "slide", scene, film_frames(frames), SHEAR_STRAIN)
+        pictures["film"] = lambda: save_animation(folder / "slide", scene, frames, "shear_strain", SHEAR_STRAIN)
     return pictures
 
 

@@ -176,7 +176,7 @@ def save_pair(path: Path, scene: Scene, runs: list[Run], key: str, quantity: Qua
             drawn.set_array(quantity.scale * frame[key])
             axes.set_title(f"{in_symbols(name)}, $t$ = {frame['time']:.1f} s", loc="left")
         panels[0].set_ylabel("$y$ [m]")
-        draw_bar(figure, figure.add_axes((0.3, 0.12, 0.4, 0.03)), quantity, limits, has_less=limits[0] != 0.0)
+        draw_bar(figure, figure.add_axes((0.3, 0.12, 0.4, 0.03)), quantity, limits)
         save_figure(figure, path)
 
 

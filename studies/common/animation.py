@@ -8,7 +8,7 @@ import itertools
 import shutil
 import subprocess
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -18,7 +18,7 @@ from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import Colormap, Normalize
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -39,48 +39,18 @@ from .progress import counted
 T = TypeVar("T")
 
 
-@dataclass
-class Frame:
-    """Particles at one time; kept in single precision, since films need many.
-
-    Args:
-        time: s.
-        position: (n, 2), m.
-        volume: (n,), m^3 per metre of thickness.
-        values: (n,) of the quantity shown, SI units.
-        bodies: segments of rigid surfaces (k, 2, 2), m.
-    """
-
-    time: float
-    position: np.ndarray
-    volume: np.ndarray
-    values: np.ndarray
-    bodies: np.ndarray = field(default_factory=lambda: np.empty((0, 2, 2)))
-
-    def __post_init__(self) -> None:
-        self.position = np.array(self.position, np.float32)
-        self.volume = np.array(self.volume, np.float32)
-        self.values = np.array(self.values, np.float32)
-
-
-def film_frames(frames: Sequence[Mapping[str, np.ndarray]]) -> list[Frame]:
-    """Stored frames of particles as those of a film that shows the accumulated shear strain."""
-    return [
-        Frame(float(f["time"]), f["position"], f["volume"], f["shear_strain"], f.get("bodies", np.empty((0, 2, 2))))
-        for f in frames
-    ]
-
-
 FASTEST, SHORTEST = 25, 4.0
 """Frames per second of a film, at most, and how many seconds it lasts, at least"""
 PIXELS_AT_ONCE = 100_000
 """Pixels of discs that are drawn together: few enough for the processor's cache"""
+NO_BODIES = np.empty((0, 2, 2))
 
 
 def save_animation(
     path: Path,
     scene: Scene,
-    frames: Sequence[Frame],
+    frames: Sequence[Mapping[str, np.ndarray]],
+    field: str,
     quantity: Quantity,
     *,
     limits: tuple[float, float] | None = None,
@@ -90,7 +60,9 @@ def save_animation(
 
     Args:
         path: without suffix; ``.mp4`` or ``.gif`` is added.
-        frames: in the order shown, at least one.
+        frames: in the order shown, at least one; particles with ``time`` [s], ``position`` (n, 2) [m], ``volume`` (n,) [m^3 per
+            metre of thickness], and rigid surfaces as ``bodies``, segments (k, 2, 2) [m], if there are any.
+        field: of the particles, (n,), shown in the colours of ``quantity``.
         limits: of the colour scale; found from all frames if not given.
         seconds: how long the film lasts at most; of more than 25 frames per second some are left out.
 
@@ -99,9 +71,11 @@ def save_animation(
     """
     if not frames:
         raise ValueError("frames is empty, expected at least one")
-    limits = limits or colour_limits(quantity, [frame.values for frame in frames])
-    corners = scene.limits([frame.position for frame in frames], [frame.bodies for frame in frames])
-    return save_film(path, frames, lambda shown: _pictures(scene, shown, quantity, limits, corners), seconds)
+    limits = limits or colour_limits(quantity, [frame[field] for frame in frames])
+    corners = scene.limits(
+        [frame["position"] for frame in frames], [frame.get("bodies", NO_BODIES) for frame in frames]
+    )
+    return save_film(path, frames, lambda shown: _pictures(scene, shown, field, quantity, limits, corners), seconds)
 
 
 def save_film(
@@ -149,7 +123,8 @@ def save_figure_film(path: Path, frames: Sequence[T], figure_of: Callable[[T], F
 
 def _pictures(
     scene: Scene,
-    frames: Iterable[Frame],
+    frames: Iterable[Mapping[str, np.ndarray]],
+    field: str,
     quantity: Quantity,
     limits: tuple[float, float],
     corners: tuple[np.ndarray, np.ndarray],
@@ -158,7 +133,7 @@ def _pictures(
     with paper_style():
         figure, axes, bar_axes = figure_with_bar(*corners, scene.half_section)
         figure.set_dpi(150)
-        draw_bar(figure, bar_axes, quantity, limits, has_less=limits[0] != 0.0)
+        draw_bar(figure, bar_axes, quantity, limits)
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
         pixels = np.asarray(canvas.buffer_rgba())
@@ -167,13 +142,14 @@ def _pictures(
         draw_scene(axes, scene)
         lines = sorted((c for c in axes.collections if c not in still), key=lambda c: c.get_zorder())
         above = _Overlay.of(canvas, axes, lines)
-        title, bodies = axes.set_title("", loc="left", pad=4), bodies_drawn(axes, np.empty((0, 2, 2)))
+        title, bodies = axes.set_title("", loc="left", pad=4), bodies_drawn(axes, NO_BODIES)
         for frame in frames:
             pixels[:] = background
-            _draw_discs(pixels, axes, frame, colormaps[quantity.colours], Normalize(*limits), quantity.scale)
+            colours = colormaps[quantity.colours](Normalize(*limits)(quantity.scale * frame[field]), bytes=True)
+            _draw_discs(pixels, axes, frame["position"], frame["volume"], colours)
             above.draw(pixels)
-            title.set_text(f"$t$ = {frame.time:.2f} s")
-            bodies.set_segments(frame.bodies)
+            title.set_text(f"$t$ = {float(frame['time']):.2f} s")
+            bodies.set_segments(frame.get("bodies", NO_BODIES))
             axes.draw_artist(bodies)
             axes.draw_artist(title)
             yield pixels[: len(pixels) // 2 * 2, : pixels.shape[1] // 2 * 2].copy()
@@ -204,17 +180,17 @@ class _Overlay:
         flat[self.rows, :3] = np.rint(below + self.opacity * (self.colours - below))
 
 
-def _draw_discs(pixels: np.ndarray, axes: Axes, frame: Frame, colours: Colormap, norm: Normalize, scale: float) -> None:
-    """Particles as discs, each with whole pixels; a tenth of the time that matplotlib takes for smooth ones."""
+def _draw_discs(pixels: np.ndarray, axes: Axes, position: np.ndarray, volume: np.ndarray, colours: np.ndarray) -> None:
+    """Particles as discs of the given colours (n, 4), each with whole pixels; a tenth of the time that matplotlib takes for smooth ones."""
     height, width = pixels.shape[:2]
     left, bottom, right, top = (int(round(edge)) for edge in axes.bbox.extents)
-    centres = axes.transData.transform(frame.position)
+    centres = axes.transData.transform(position)
     columns, rows = np.rint(centres[:, 0] - 0.5).astype(int), height - 1 - np.rint(centres[:, 1] - 0.5).astype(int)
     inside = (columns >= left) & (columns < right) & (rows >= height - top) & (rows < height - bottom)
     per_metre = axes.bbox.width / np.ptp(axes.get_xlim())
     # Twice the radius in whole pixels: so many kinds of discs there are.
-    kinds = np.maximum(np.rint(disc_diameter(frame.volume) * per_metre), 1).astype(int)
-    shown = np.ascontiguousarray(colours(norm(scale * frame.values), bytes=True)).view(np.uint32)[:, 0]
+    kinds = np.maximum(np.rint(disc_diameter(volume) * per_metre), 1).astype(int)
+    shown = np.ascontiguousarray(colours).view(np.uint32)[:, 0]
     flat = pixels.reshape(-1, 4).view(np.uint32)[:, 0]
     for kind in np.unique(kinds[inside]):
         chosen = np.flatnonzero(inside & (kinds == kind))

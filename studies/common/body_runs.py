@@ -17,7 +17,7 @@ from mpm_core.probes import ProbeFile
 import mpm_core as mpm
 from particle_player import Movie
 
-from .animation import film_frames, save_animation
+from .animation import save_animation
 from .checkpoint import Checkpoints, add_checkpoint_options, numbered
 from .figures import Pictures
 from .history import History
@@ -177,7 +177,7 @@ def body_pictures(
         for name, (key, quantity) in kinds.items()
     }  # fmt: skip
     if a.film:
-        pictures["film"] = partial(save_animation, folder / "film", scene, film_frames(result.frames), SHEAR_STRAIN)
+        pictures["film"] = partial(save_animation, folder / "film", scene, result.frames, "shear_strain", SHEAR_STRAIN)
     return pictures
 
 

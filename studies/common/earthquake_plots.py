@@ -97,5 +97,5 @@ def save_ground(path: Path, frame: Mapping[str, np.ndarray], name: str, quantity
         axes.set(aspect="equal", xlabel="$x$ [m]", ylabel="$y$ [m]", xlim=(low[0] - margin, high[0] + margin),
                  ylim=(low[1] - margin, high[1] + margin))  # fmt: skip
         axes.set_title(f"$t$ = {frame['time']:.1f} s; resting cells drawn as triangles", loc="left", pad=4)
-        draw_bar(figure, bar, quantity, limits, has_less=limits[0] != 0.0)
+        draw_bar(figure, bar, quantity, limits)
         save_figure(figure, path)

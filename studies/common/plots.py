@@ -18,7 +18,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
-from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -85,23 +84,17 @@ def discs(axes: Axes, position: np.ndarray, volume: np.ndarray, **look: object) 
     return collection
 
 
-def draw_bar(
-    figure: Figure, bar_axes: Axes, quantity: Quantity, limits: tuple[float, float], has_less: bool = True
-) -> None:
-    """The colour bar, with arrows where values beyond its ends may occur."""
+def draw_bar(figure: Figure, bar_axes: Axes, quantity: Quantity, limits: tuple[float, float]) -> None:
+    """The colour bar, with arrows where values beyond its ends may occur; a scale from zero has none below."""
     colours = ScalarMappable(Normalize(*limits), quantity.colours)
-    extend = "both" if has_less else "max"
+    extend = "max" if limits[0] == 0.0 else "both"
     bar = figure.colorbar(colours, cax=bar_axes, orientation="horizontal", extend=extend, ticks=copy(ROUND_TICKS))
-    _shorten(bar)
-    bar.set_label(quantity.label, labelpad=2)
-    bar.outline.set_linewidth(0.5)
-
-
-def _shorten(bar: Colorbar) -> None:
-    """Take the power of ten out of small numbers, which would overlap: it is written at the end of the bar."""
+    # The power of ten of small numbers, which would overlap, is written at the end of the bar.
     bar.formatter.set_powerlimits((-3, 5))
     bar.formatter.set_useMathText(True)
     bar.update_ticks()
+    bar.set_label(quantity.label, labelpad=2)
+    bar.outline.set_linewidth(0.5)
 
 
 def save_particles(
@@ -155,7 +148,7 @@ def save_particles(
                 fontsize=8,
             )
         axes.set_title(title, loc="left", pad=4)
-        draw_bar(figure, bar_axes, quantity, limits, has_less=limits[0] != 0.0)
+        draw_bar(figure, bar_axes, quantity, limits)
         save_figure(figure, path)
 
 

@@ -18,7 +18,7 @@ from mpm_core.setup_warnings import keeps_volume
 import fenics_bridge as bridge
 import mpm_core as mpm
 
-from .animation import film_frames, save_animation
+from .animation import save_animation
 from .figures import Pictures
 from .history import History
 from .interrupt import Interrupt
@@ -150,7 +150,7 @@ def slide_pictures(a: Namespace, result: Slide, scene: Scene | None, folder: Pat
             limits=(0, max(0.1, 1.05 * largest.max()))),
     }  # fmt: skip
     if a.film:
-        pictures["film"] = lambda: save_animation(folder / "slide", scene, film_frames(result.frames), SHEAR_STRAIN)
+        pictures["film"] = lambda: save_animation(folder / "slide", scene, result.frames, "shear_strain", SHEAR_STRAIN)
     return pictures
 
 

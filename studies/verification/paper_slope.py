@@ -155,6 +155,6 @@ def draw_variants(path, slides):
                     axes.set_title(name, loc="left", fontsize=8, pad=2)
             box = panels[-1, column].get_position()
             bar = figure.add_axes((box.x0, 0.045, box.width, 0.008))
-            draw_bar(figure, bar, quantity, limits, has_less=limits[0] != 0.0)
+            draw_bar(figure, bar, quantity, limits)
             bar.set_xticks(np.linspace(*limits, 3))
         save_figure(figure, path)

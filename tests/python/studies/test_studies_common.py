@@ -260,8 +260,10 @@ def test_a_picture_that_fails_costs_only_itself(tmp_path, capsys):
 
 def test_discs_of_a_film_have_their_place_size_and_colour():
     position, volume = np.array([[0.5, 0.25], [0.1, 0.75]]), np.full(2, 0.02)
-    frame = animation.Frame(1.0, position, volume, np.array([0.0, 1.0]))
-    (pixels,) = animation._pictures(scene(), [frame], plots.SHEAR_STRAIN, (0.0, 1.0), scene().limits([position]))
+    frame = {"time": 1.0, "position": position, "volume": volume, "strain": np.array([0.0, 1.0])}
+    (pixels,) = animation._pictures(
+        scene(), [frame], "strain", plots.SHEAR_STRAIN, (0.0, 1.0), scene().limits([position])
+    )
     colours = colormaps[plots.SHEAR_STRAIN.colours]([0.0, 1.0], bytes=True)[:, :3]
     height, width = pixels.shape[:2]
     with plots.paper_style():
@@ -283,7 +285,10 @@ def test_films_have_their_frames(tmp_path, monkeypatch, has_ffmpeg):
         monkeypatch.setattr(animation.shutil, "which", lambda _: None)
     elif not animation.shutil.which("ffmpeg"):
         pytest.skip("needs ffmpeg")
-    frames = [animation.Frame(0.1 * k, POSITION + 0.1 * k, VOLUME, np.full(3, 0.1 * k)) for k in range(4)]
-    path = animation.save_animation(tmp_path / "slide", scene(), frames, plots.DISPLACEMENT, seconds=1.0)
+    frames = [{"time": 0.1 * k, "position": POSITION + 0.1 * k, "volume": VOLUME, "displacement": np.full(3, 0.1 * k)}
+              for k in range(4)]  # fmt: skip
+    path = animation.save_animation(
+        tmp_path / "slide", scene(), frames, "displacement", plots.DISPLACEMENT, seconds=1.0
+    )
     assert path.suffix == (".mp4" if has_ffmpeg else ".gif")
     assert path.stat().st_size > 2000
