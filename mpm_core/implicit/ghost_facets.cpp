@@ -1,5 +1,9 @@
 #include "implicit/ghost_facets.h"
 
+#include "contact/clearance.h"
+#include "implicit/contact_step.h"
+#include "model/velocity_field.h"
+
 #include <algorithm>
 
 namespace mpm::implicit
@@ -30,6 +34,59 @@ std::vector<CellContents> cell_contents(const Mesh<D>& mesh, const MaterialPoint
   }
   update(cells, contents);
   return contents;
+}
+
+/// Mass that each of some cells, in rising order, gives to its nodes.
+template <int D>
+std::vector<std::array<double, D + 1>> own_masses(const Mesh<D>& mesh, const MaterialPoints<D>& points,
+                                                  const std::vector<Index>& cells)
+{
+  std::vector<std::array<double, D + 1>> masses(cells.size());
+  for (const Run& run : points.runs)
+  {
+    const auto found = std::ranges::lower_bound(cells, run.cell);
+    if (found == cells.end() || *found != run.cell)
+      continue;
+    for (Index p = run.first; p < run.last; ++p)
+    {
+      const auto weights = weights_at<D>(mesh.shapes[run.cell], at<D>(points.particles.position, p));
+      for (int k = 0; k <= D; ++k)
+        masses[found - cells.begin()][k] += weights[k] * points.particles.mass[p];
+    }
+  }
+  return masses;
+}
+
+/// Of cells without filled neighbours, those that hang on other cells by so few nodes that they could turn about these:
+/// no support and no rigid surface holds them.
+/// @param lone  in rising order
+template <class G>
+std::vector<Index> hanging_cells(Model<G>& model, const MaterialPoints<G::dim>& points, const std::vector<Index>& lone)
+{
+  constexpr int D = G::dim;
+  const VelocityField<G>& field = model.fields.front();
+  std::vector<Index> hanging, supported;
+  for (const auto& support : field.supports)
+    supported.push_back(support.node);
+  std::ranges::sort(supported);
+  for (auto& contact : model.contacts)
+    contact::keep_clearance<D>(model.mesh, contact);
+  const auto masses = own_masses(model.mesh, points, lone);
+  for (std::size_t n = 0; n < lone.size(); ++n)
+  {
+    const auto cell = static_cast<std::size_t>(lone[n]);
+    int held = 0;
+    for (int k = 0; k <= D; ++k)
+    {
+      const Index node = model.mesh.cells[cell][k];
+      held += field.nodes[node].mass > (1 + 1e-9) * masses[n][k] || std::ranges::binary_search(supported, node);
+    }
+    const bool touches = std::ranges::any_of(model.contacts, [cell](const auto& contact)
+                                             { return contact::may_be_near(contact.bounds[cell], contact.travel); });
+    if (held > 0 && held < D && !touches)
+      hanging.push_back(lone[n]);
+  }
+  return hanging;
 }
 
 /// The facet of a cell opposite to vertex k, to a neighbour; without its coefficients.
@@ -93,20 +150,27 @@ void set_weights(const Mesh<D>& mesh, Index c, int k, double volumes, const Cell
 } // namespace
 
 template <class G, int D>
-std::vector<GhostFacet<D>> find_ghost_facets(const Mesh<D>& mesh, const MaterialPoints<D>& points, const Halo& cells,
-                                             const GhostOptions& options)
+std::vector<GhostFacet<D>> find_ghost_facets(Model<G>& model, const MaterialPoints<D>& points, const Halo& cells,
+                                             const GhostOptions& options, bool quasi_static)
 {
+  const Mesh<D>& mesh = model.mesh;
   std::vector<GhostFacet<D>> facets;
   if (options.filled == 0)
     return facets;
   const auto contents = cell_contents(mesh, points, cells);
   const auto bad = [&](Index c) { return contents[c].volume < options.filled * cell_volume<G>(mesh.shapes[c]); };
   const auto filled = [&](Index c) { return c != none && contents[c].volume > 0; };
+  const auto alone = [&](Index c) { return filled(c) && std::ranges::none_of(mesh.neighbours[c], filled); };
+  std::vector<Index> full_and_alone;
+  for (Index c = 0; c < mesh.owned_cells && quasi_static; ++c) // with inertia they swing
+    if (!bad(c) && alone(c))
+      full_and_alone.push_back(c);
+  const auto hanging = hanging_cells(model, points, full_and_alone);
   for (Index c = 0; c < mesh.owned_cells; ++c)
   {
     if (!filled(c))
       continue;
-    const bool lone = bad(c) && std::none_of(mesh.neighbours[c].begin(), mesh.neighbours[c].end(), filled);
+    const bool lone = bad(c) ? alone(c) : std::ranges::binary_search(hanging, c);
     for (int k = 0; k <= D; ++k)
     {
       const Index other = mesh.neighbours[c][k];
@@ -132,8 +196,8 @@ std::vector<GhostFacet<D>> find_ghost_facets(const Mesh<D>& mesh, const Material
 }
 
 #define INSTANTIATE(G)                                                                                                 \
-  template std::vector<GhostFacet<G::dim>> find_ghost_facets<G>(const Mesh<G::dim>&, const MaterialPoints<G::dim>&,    \
-                                                                const Halo&, const GhostOptions&);
+  template std::vector<GhostFacet<G::dim>> find_ghost_facets<G>(Model<G>&, const MaterialPoints<G::dim>&, const Halo&, \
+                                                                const GhostOptions&, bool);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

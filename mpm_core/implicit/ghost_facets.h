@@ -11,7 +11,8 @@
 /// the step's start would give, dt (v - v0), so that a steady motion is not braked step by step (Burman 2010; Sticko &
 /// Kreiss 2016 for the mass; Coombs 2023 in implicit MPM). Affine fields feel nothing of it, and only facets of badly
 /// filled cells have it, so a body whose cells are filled is not touched. A cell that has no filled neighbour is tied
-/// to a gradient of zero instead.
+/// to a gradient of zero instead; so is, in steps without inertia, a filled cell that hangs on other cells by fewer
+/// than D nodes, since nothing else keeps it from turning about them.
 
 #include "model/material_points.h"
 #include "parallel/halo.h"
@@ -42,10 +43,11 @@ struct GhostFacet
 
 /// The stabilised facets of this rank's owned cells.
 /// @param cells  halo of the mesh's cells
+/// @pre the nodes have their masses
 /// @note Collective over neighbours
 template <class G, int D = G::dim>
-std::vector<GhostFacet<D>> find_ghost_facets(const Mesh<D>& mesh, const MaterialPoints<D>& points, const Halo& cells,
-                                             const GhostOptions& options);
+std::vector<GhostFacet<D>> find_ghost_facets(Model<G>& model, const MaterialPoints<D>& points, const Halo& cells,
+                                             const GhostOptions& options, bool quasi_static);
 
 /// Jump over a facet of a nodal field, a callable Index -> Vector<D>
 template <int D, class Nodal>

@@ -75,7 +75,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   update(step.halos.nodes, field.start_velocity);
   find_active(model.mesh, model.exchange, field, step);
   find_frequencies(model.mesh, model.exchange, points, field, step);
-  step.ghosts = find_ghost_facets<G>(model.mesh, points, step.halos.cells, options.ghost);
+  step.ghosts = find_ghost_facets<G>(model, points, step.halos.cells, options.ghost, options.quasi_static);
   field.velocity = field.start_velocity;
   impose_supports(step, field);
   begin_first_stage(field, step);
@@ -89,6 +89,7 @@ template <class G>
 void start_second_stage(Model<G>& model, ImplicitStep<G>& step)
 {
   VelocityField<G>& field = model.fields.front();
+  keep_contact_forces(step);
   begin_second_stage(field, step);
   impose_supports(step, field);
   step.external = external_forces(field, gravity_at(model, model.time + step.dt), step.options.load_fraction);

@@ -159,7 +159,10 @@ def _failure(ksp: PETSc.KSP, reason: int, iterations: int) -> str:
     }
     failed = f"the linear solver failed ({method} with {pc}: {names.get(reason, reason)}"
     if method == "preonly":
-        return f"{failed}: the matrix is singular, or not finite; do the supports hold the body?)"
+        return (
+            f"{failed}: the matrix is singular, or not finite; do the supports hold the body, also each part of it that is joined to "
+            "the rest at one node of the mesh only?)"
+        )
     return (
         f"{failed} after {iterations} iterations; do the supports hold the body? Near collapse a smaller step or a direct "
         f"solver may help: -{prefix}ksp_type preonly -{prefix}pc_type lu -{prefix}pc_factor_mat_solver_type mumps)"
