@@ -172,9 +172,10 @@ SeenSurface<D> seen_from(const Contact<D>& contact, Index cell, double motion)
 template <class G>
 Spring spring_of(const Particles<G::dim>& particles, Index p, const ContactModuli& moduli, double penalty)
 {
-  const double radius = particle_radius<G>(particles, p), area = particle_area<G>(particles, p, radius);
+  const double radius = particle_radius<G>(particles, p), area = particle_area<G>(particles, p, radius, 0);
   const double per_modulus = relative_stiffness * penalty * area / (2 * radius);
-  return {smoothing * radius, area, per_modulus * moduli.compression, per_modulus * moduli.shear};
+  return {smoothing * radius, area, G::has_hoop ? -2 * radius * radius : 0, per_modulus * moduli.compression,
+          per_modulus * moduli.shear};
 }
 
 template <class G>
@@ -197,6 +198,7 @@ bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring&
     place[i] = x[i] + u[i];
   const auto [apart, normal] = distance_at<D>(seen, end, place);
   touch.normal = normal;
+  touch.area = spring.area + spring.by_normal * normal[0];
   const double overlap = (radius - apart) / spring.onset;
   if (overlap < -farthest)
     return false;
@@ -206,7 +208,9 @@ bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring&
   const Relative<D> relative = relative_motion<D>(contact.body, end, u, touch.arm);
   const bool rough = !contact.slip.empty();
   const double per_depth = contact.friction * spring.stiffness / spring.shear; // of the longest slip
-  const double longest = per_depth * touch.depth + contact.adhesion * spring.area / spring.shear;
+  const double adheres = 1 / (1 + std::exp(-(overlap + farthest / 2) / 2));    // from nearly 0 at `farthest` to 1
+  const double stuck = contact.adhesion * touch.area / spring.shear;           // slip at which adhesion alone gives way
+  const double longest = per_depth * touch.depth + stuck * adheres;
   touch.slip = rough ? old : Vector<D>{};
   if (rough)
     touch.sticks = update_slip<D>(normal, relative.motion, longest, touch.slip);
@@ -227,7 +231,7 @@ bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring&
     a[i] = old[i] + relative.motion[i];
   Matrix<D> slip = trial_slip_derivative<D>(normal, a, relative.turn, apart, h);
   if (!touch.sticks)
-    slide<D>(a, longest, per_depth * rises, spring, slip, touch);
+    slide<D>(a, longest, per_depth * rises + stuck * adheres * (1 - adheres) / (2 * spring.onset), spring, slip, touch);
   touch.stiffness = combined<D>(1, touch.stiffness, spring.shear, slip);
   return true;
 }
@@ -242,6 +246,7 @@ EndTouch<D> tied_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spr
   for (int i = 0; i < D; ++i)
     place[i] = x[i] + u[i];
   touch.normal = distance_at<D>(seen, end, place).normal;
+  touch.area = spring.area + spring.by_normal * touch.normal[0];
   for (int i = 0; i < D; ++i)
   {
     touch.arm[i] = place[i] - end.displacement[i] - end.centre[i];

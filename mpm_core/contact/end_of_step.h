@@ -5,8 +5,9 @@
 /// A particle moves by u, the body to its place at the step's end. There its gap g, the normal n and the motion w of
 /// the particle relative to the body give
 ///
-///     f = kappa <-g> n - kappa_t s,   |kappa_t s| <= mu kappa <-g> + a A_p,   <-g> = d ln(1 + exp(-g / d)),
+///     f = kappa <-g> n - kappa_t s,   |kappa_t s| <= mu kappa <-g> + a A_p h,   <-g> = d ln(1 + exp(-g / d)),
 ///     kappa = 50 beta M A_p / (2 r_p),   kappa_t = 50 beta G A_p / (2 r_p),   d = 1e-5 r_p,
+///     h = 1 / (1 + exp((g / d - 15) / 2)),
 ///
 /// with the moduli M of compression without lateral strain and G of shear, and the slip s = P (s_0 + w) along the
 /// surface, P = 1 - n n^T, before it is returned to the cone of friction. With beta = 0.2 the springs are ten times as
@@ -53,7 +54,8 @@ struct ContactModuli
 struct Spring
 {
   double onset;     ///< d [m]
-  double area;      ///< that it covers [m2]
+  double area;      ///< that it covers of a surface as far from the axis as itself [m2]
+  double by_normal; ///< derivative of the area by the normal's component away from the axis, in axial symmetry
   double stiffness; ///< kappa [N/m]
   double shear;     ///< kappa_t, along the surface [N/m]
 };
@@ -84,6 +86,7 @@ struct EndTouch
   Vector<D> arm{};       ///< from the body's centre to the nearest point of its surface, or to a tied particle [m]
   Vector<D> normal{};    ///< of the surface there
   double depth = 0;      ///< [m]
+  double area = 0;       ///< of the surface that the particle covers [m2]
   bool sticks = true;
 };
 

@@ -108,7 +108,7 @@ std::optional<Vector<D>> bond_force(const Press<D>& press, const Distance<D>& ne
   const double mass = particles.mass[p], stiffness = press.stiffness * mass;
   for (int i = 0; i < D; ++i)
     force[i] = -stiffness * (stretch[i] + press.dt * (velocity[i] - contact.body.velocity[i]) - turned[i]);
-  const double area = particle_area<G>(particles, p, particle_radius<G>(particles, p));
+  const double area = particle_area<G>(particles, p, particle_radius<G>(particles, p), touch.normal[0]);
   Reaction<D>& reaction = contact.reaction;
   reaction.energy += 0.5 * stiffness * dot<D>(stretch, stretch);
   reaction.load += mass * (press.per_mass + press.per_inertia * dot<D>(arm, arm));
@@ -147,7 +147,7 @@ std::optional<Vector<D>> particle_force(const Press<D>& press, const Distance<D>
     leave_slip<D>(press, p);
     return std::nullopt;
   }
-  const double area = particle_area<G>(particles, p, radius);
+  const double area = particle_area<G>(particles, p, radius, touch.normal[0]);
   reaction.area += area;
   reaction.mass += mass;
   reaction.normal += stiffness * depth;

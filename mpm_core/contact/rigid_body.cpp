@@ -132,6 +132,16 @@ void move_body(double dt, RigidBody<D>& body)
 }
 
 template <int D>
+void stop_driven(RigidBody<D>& body)
+{
+  for (std::size_t i = 0; i < D; ++i)
+    if (body.drive[i] != Drive::prescribed)
+      body.velocity[i] = 0;
+  if (body.rotates)
+    set_spin({}, body);
+}
+
+template <int D>
 double kinetic_energy(const RigidBody<D>& body)
 {
   double energy = 0;
@@ -150,6 +160,7 @@ double kinetic_energy(const RigidBody<D>& body)
   template void prescribe_motion(const TimeStep&, const Reaction<D>&, RigidBody<D>&);                                  \
   template void accelerate_body<D>(const TimeStep&, const Vector<D>&, const Reaction<D>&, RigidBody<D>&);              \
   template void move_body(double, RigidBody<D>&);                                                                      \
+  template void stop_driven(RigidBody<D>&);                                                                            \
   template double kinetic_energy(const RigidBody<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)

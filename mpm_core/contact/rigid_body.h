@@ -98,6 +98,10 @@ void move_body(double dt, RigidBody<D>& body);
 template <int D>
 void set_spin(const Vector<3>& spin, RigidBody<D>& body);
 
+/// Lets the axes that are not prescribed rest: velocities of a step without inertia are only ways over its length.
+template <int D>
+void stop_driven(RigidBody<D>& body);
+
 /// Kinetic energy along the free axes and of free rotation [J].
 template <int D>
 double kinetic_energy(const RigidBody<D>& body);

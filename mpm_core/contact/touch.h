@@ -16,14 +16,16 @@ double particle_cube(const Particles<G::dim>& particles, Index p)
   return particles.volume[p] / (G::has_hoop ? particles.position[0][p] : 1);
 }
 
-/// Area of surface that a particle covers [m2]; per metre or per radian in two dimensions.
+/// Area of surface that a touching particle covers [m2]; per metre or per radian in two dimensions.
+/// @param normal_r  component of the surface's normal away from the axis, for axial symmetry: the surface is nearer to
+///                  the axis than the particle, or farther from it
 template <class G>
-double particle_area(const Particles<G::dim>& particles, Index p, double radius)
+double particle_area(const Particles<G::dim>& particles, Index p, double radius, double normal_r)
 {
   if constexpr (G::dim == 3)
     return 4 * radius * radius;
   else
-    return 2 * radius * (G::has_hoop ? particles.position[0][p] : 1);
+    return 2 * radius * (G::has_hoop ? particles.position[0][p] - radius * normal_r : 1);
 }
 
 /// Whether a cube with this side is smaller: compared by volumes, since roots take their time.

@@ -198,13 +198,25 @@ void keep_slip(Model<G>& model, const ImplicitStep<G>& step)
         continue;
       react<D>(touch.force, touch.arm, reaction);
       reaction.normal += dot<D>(touch.force, touch.normal);
-      reaction.area += spring.area;
-      reaction.sticking += (slips || !contact.bond.empty()) && touch.sticks ? spring.area : 0;
+      reaction.area += touch.area;
+      reaction.sticking += (slips || !contact.bond.empty()) && touch.sticks ? touch.area : 0;
       reaction.mass += model.particles.mass[p];
       const double slips_by = contact.bond.empty() ? spring.shear : spring.stiffness;
       reaction.energy +=
           0.5 * (spring.stiffness * touch.depth * touch.depth + slips_by * dot<D>(touch.slip, touch.slip));
     }
+  }
+}
+
+template <class G>
+void keep_contact_forces(ImplicitStep<G>& step)
+{
+  for (auto& trial : step.contact.surfaces)
+  {
+    Reaction<G::dim> reaction;
+    for (const auto& at_surface : trial.touching)
+      react<G::dim>(at_surface.touch.force, at_surface.touch.arm, reaction);
+    trial.before = reaction.force;
   }
 }
 
@@ -217,8 +229,12 @@ void move_bodies(Model<G>& model, const ImplicitStep<G>& step)
     auto& contact = model.contacts[k];
     contact.body = step.contact.surfaces[k].end;
     contact.travel += step_travel(contact, contact.body, step.length);
+    if (step.options.quasi_static)
+      stop_driven(contact.body);
+    const auto& before = step.contact.surfaces[k].before;
+    const double weight = step.stage.weight; // 1 in steps of first order
     for (int i = 0; i < G::dim; ++i)
-      contact.impulse[i] += step.length * contact.reaction.force[i];
+      contact.impulse[i] += step.length * (weight * contact.reaction.force[i] + (1 - weight) * before[i]);
   }
 }
 
@@ -240,6 +256,7 @@ void add_contact_tractions(Model<G>& model, const ImplicitStep<G>& step)
   template void add_contact_forces(const ImplicitStep<G>&, std::vector<NodalForces<G::dim>>&);                         \
   template void add_contact_entries(const Mesh<G::dim>&, const ImplicitStep<G>&, TangentSum<G::dim>&);                 \
   template void keep_slip(Model<G>&, const ImplicitStep<G>&);                                                          \
+  template void keep_contact_forces(ImplicitStep<G>&);                                                                 \
   template void move_bodies(Model<G>&, const ImplicitStep<G>&);                                                        \
   template void add_contact_tractions(Model<G>&, const ImplicitStep<G>&);
 INSTANTIATE(PlaneStrain)

@@ -21,6 +21,10 @@ void add_contact_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, Tange
 template <class G>
 void keep_slip(Model<G>& model, const ImplicitStep<G>& step);
 
+/// Keeps the forces on surfaces at the end of the first of two stages.
+template <class G>
+void keep_contact_forces(ImplicitStep<G>& step);
+
 /// Moves the bodies to where they are at the end of the trial; the step is accepted.
 template <class G>
 void move_bodies(Model<G>& model, const ImplicitStep<G>& step);

@@ -23,6 +23,7 @@ struct TrialContact
 {
   RigidBody<D> end; ///< the body at the end of the stage
   std::vector<TouchingParticle<D>> touching;
+  Vector<D> before{}; ///< force on the body at the end of the first of two stages, of this rank's particles [N]
 };
 
 /// What the particles of a cell that touch surfaces add to the tangent.

@@ -45,3 +45,34 @@ def test_hoop_stresses_hold_a_ring_in_a_funnel(slope, friction):
         assert funnel.pressure * funnel.area == pytest.approx(weight / np.cos(theta), rel=1e-5)
     else:
         assert 0 < funnel.force[0] < weight * np.tan(theta) and funnel.sticking_fraction == 1.0
+
+
+@pytest.mark.parametrize("scheme", ["explicit", "implicit"])
+@pytest.mark.parametrize("inside", [False, True])
+def test_the_area_of_a_shaft_is_its_radius_times_its_length(scheme, inside):
+    """Per radian, also where the shaft is hardly thicker than a particle; so is the force of adhesion over its strength."""
+    radius, length, side, adhesion = 0.2 if inside else 0.05, 0.6, 0.025, 1000.0
+    model = mpm.Model(
+        box((16, 12), (0.8, length), diagonals="alternating"), mpm.LinearElastic(young=1e7, poisson=0.0),
+        geometry=mpm.Geometry.AXISYMMETRIC,
+    )  # fmt: skip
+    columns = round((radius if inside else 0.8 - radius) / side)
+    points = (np.indices((columns, round(length / side))).reshape(2, -1).T + 0.5) * side
+    points[:, 0] += 0 if inside else radius
+    model.seed_points(points, side**2 * points[:, 0], density=1000.0)
+    for tag in (3, 4):
+        model.roller(tag, (0, 1))
+    if not inside:
+        model.fix(2)
+    stress = model.particles.stress.copy()
+    stress[:, :3] = -20e3
+    model.particles.set("stress", stress)
+    surface = mpm.Plane((radius + 1e-9, 0), (-1, 0)) if inside else mpm.Box((-1, -1), (radius - 1e-9, 2))
+    shaft = model.add_contact(surface, adhesion=adhesion, velocity=(0, 0.2))
+    mixed = mpm.Integration.MIXED
+    if scheme == "explicit":
+        list(model.explicit(0.04, damping=0.5, integration=mixed))
+    else:
+        list(model.implicit(0.04, dt=0.02, quasi_static=True, integration=mixed))
+    assert shaft.area == pytest.approx(radius * length, rel=2e-3)
+    assert abs(shaft.force[1]) == pytest.approx(adhesion * radius * length, rel=2e-3)
