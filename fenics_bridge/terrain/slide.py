@@ -12,6 +12,9 @@ import mpm_core as mpm
 from fenics_bridge.errors import InputError
 from fenics_bridge.terrain.raster import Raster
 
+THINNEST = 0.1
+"""Thickness of the soil, over the spacing of particles, from which on it is filled"""
+
 
 def seed_slide(
     model: mpm.Model,
@@ -26,7 +29,8 @@ def seed_slide(
 ) -> tuple[Any, float]:
     """Fill the space between two rasters with particles, and let them touch the ground that is left. Collective.
 
-    The particles of a column stand at equal distances, with the volume of the soil there. Where the ground is steep or hollow
+    The particles of a column stand at equal distances, with the volume of the soil there; where it is thinner than a tenth of the
+    spacing it is left out. Where the ground is steep or hollow
     they are lifted until none is nearer to it than its radius: by a fraction of the spacing, the largest of which is returned.
 
     Args:
@@ -60,14 +64,14 @@ def _points(before: Any, rupture: Any, surface: Any, spacing: float) -> tuple[An
         raise InputError(f"spacing is {spacing!r} m, expected a positive length")
     low = np.maximum((before.x[0], before.y[0]), (rupture.x[0], rupture.y[0]))
     high = np.minimum((before.x[-1], before.y[-1]), (rupture.x[-1], rupture.y[-1]))
-    along = [a + spacing * (np.arange(int((b - a) / spacing)) + 0.5) for a, b in zip(low, high)]
+    along = [a + spacing * (np.arange(int((b - a) / spacing + 1e-9)) + 0.5) for a, b in zip(low, high)]
     plan = np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
     thickness = before.at(plan) - rupture.at(plan)
-    numbers = np.round(thickness / spacing).astype(int)  # of particles in a column
+    numbers = np.maximum(np.round(thickness / spacing).astype(int), thickness > THINNEST * spacing)  # in a column
     plan, thickness, numbers = plan[numbers > 0], thickness[numbers > 0], numbers[numbers > 0]
     if len(plan) == 0:
         raise InputError(
-            f"before is nowhere higher than rupture by more than half a spacing of {spacing:g} m, expected a body"
+            f"before is nowhere higher than rupture by more than {THINNEST:g} of a spacing of {spacing:g} m, expected a body"
         )
     column = np.repeat(np.arange(len(plan)), numbers)
     first = np.repeat(np.cumsum(numbers) - numbers, numbers)
