@@ -232,6 +232,9 @@ def checked(surface: Surface, dim: int) -> Any:
 ROUND_OFF = 1e-12
 """Overlap of soil and a surface that counts as touching, over the largest coordinate of the mesh"""
 
+DEEPEST = 0.1
+"""Overlap that is a mistake where soil was placed after the surface, over the radius of the largest particle"""
+
 
 def add_contact(
     model: Model, surface: Surface, friction: float, adhesion: float, penalty: float, centre: ArrayLike | None,
@@ -258,14 +261,10 @@ def add_contact(
 
     new = collectively(model.comm, entry)
     warn_of_friction(model.comm, friction)
-    gap = smallest_gap(model, surface)
-    if gap == np.inf:
+    if smallest_gap(model, surface) == np.inf:
         raise InputError("the model has no particles, seed some before surfaces are added")
-    if not bonded and gap < -ROUND_OFF * np.abs(mesh_box(model)).max():
-        raise InputError(
-            f"surface {surface!r} overlaps the soil by {-gap:.6g} m, expected it outside of all particles, which have the radius "
-            "V^(1/D)/2; see Model.gap, and for planes and polylines the side on which the soil is"
-        )
+    if not bonded:
+        require_outside(model, surface)
     if isinstance(surface, Triangles):
         model._triangulated[surface.fingerprint] = surface
     tied = None
@@ -276,6 +275,27 @@ def add_contact(
     if tied is not None:
         model.particles.set(bond_name(len(model._contacts) - 1), tied)
     return RigidContact(model, len(model._contacts) - 1)
+
+
+def require_outside(model: Model, surface: Surface, depth: float = 0.0) -> None:
+    """Raise an InputError where soil is deeper than this inside of a surface [m]. Collective."""
+    gap = smallest_gap(model, surface)
+    if gap < -depth - ROUND_OFF * np.abs(mesh_box(model)).max():
+        raise InputError(
+            f"surface {surface!r} overlaps the soil by {-gap:.6g} m, expected it outside of all particles, which have the radius "
+            "V^(1/D)/2; see Model.gap, and for planes and polylines the side on which the soil is"
+        )
+
+
+def require_new_soil_outside(model: Model) -> None:
+    """Raise an InputError where soil was placed inside of a surface after that was added, before the first step. Collective."""
+    if model.steps > 0 or not model._contacts:
+        return
+    size = model.particles.volume / (model.particles.position[:, 0] if model.geometry == Geometry.AXISYMMETRIC else 1)
+    radius = 0.5 * model.comm.allreduce(float(size.max(initial=0.0)), MPI.MAX) ** (1 / model.mesh.dim)
+    for entry in model._contacts:
+        if not entry["bonded"]:
+            require_outside(model, surface_of(model, entry["surface"]), DEEPEST * radius)
 
 
 BOND_REACH = 1.5

@@ -37,8 +37,8 @@ class ContactMethods:
         """Add contact of the particles with a rigid surface, which does not depend on the mesh.
 
         The surface pushes on particles that are nearer to it than their radius V^(1/D)/2, without tension, and resists
-        sliding with Coulomb friction and adhesion (docs/contact.md). It is at rest, moves as prescribed, or, in explicit
-        steps, moves as a rigid body under the forces on it. With ``bonded`` the soil beside it is tied to it instead: a
+        sliding with Coulomb friction and adhesion (docs/contact.md). It is at rest, moves as prescribed, or moves as a
+        rigid body under the forces on it. With ``bonded`` the soil beside it is tied to it instead: a
         prescribed displacement on a boundary that cuts cells.
 
         Args:

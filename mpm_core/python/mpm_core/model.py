@@ -12,7 +12,7 @@ from .absorbing import refuse_absorbing
 from .body import Body
 from .checks import flag, of_kind, positive, watcher
 from .collective import collectively
-from .contact import refuse_contacts, refuse_driven_bodies
+from .contact import refuse_contacts, refuse_driven_bodies, require_new_soil_outside
 from .contact_methods import ContactMethods
 from .energy import energy_limit as checked_energy_limit
 from .explicit import (
@@ -248,6 +248,7 @@ class Model(ContactMethods, Body):
         begin_two_phases(self, integration, stress_update, damped)
         run.conversion = checked_conversion(self, conversion, integration)
         require_particles(self)
+        require_new_soil_outside(self)
         warn_of_setup(self, nmd)
         if moving_cells:
             warn_of_parts(self)
@@ -349,6 +350,7 @@ class Model(ContactMethods, Body):
         )
         core_conversion = checked_conversion(self, conversion, integration)
         require_particles(self)
+        require_new_soil_outside(self)
         warn_of_setup(self, nmd)
         reports = run_implicit(
             self, method, options, times=times, dt=longest, watch=watch, every_steps=steps, rebalance=threshold,

@@ -32,7 +32,8 @@ class FreeBody:
         axes: for each axis, whether the body moves freely along it; along the others, as the prescribed velocity says. All by
             default, in axial symmetry only y.
         rotates: whether it rotates freely; otherwise it has the prescribed spin. True by default, except in axial symmetry.
-        force: applied at its centre [N], shape (D,); or (times [s], forces (n, D)), in addition to the weight of the body.
+        force: applied at its centre [N], shape (D,); or (times [s], forces (n, D)), in addition to the weight of the body. Per
+            metre in plane strain, per radian in axial symmetry.
     """
 
     mass: float
@@ -51,7 +52,8 @@ class Servo:
     steps end with the load of their end on the soil, whatever the speed.
 
     Args:
-        force: that the body passes on to the soil [N], shape (D,); or (times [s], forces (n, D)). Entries of other axes are zero.
+        force: that the body passes on to the soil [N], shape (D,); or (times [s], forces (n, D)). Per metre in plane strain, per
+            radian in axial symmetry, of which a total load is 2 pi times as much. Entries of other axes are zero.
         speed: largest speed along each axis [m/s]; with it the body approaches the soil.
         axes: for each axis, whether it is controlled; by default those with a force other than zero. Along the others the body
             moves with the prescribed velocity.

@@ -32,10 +32,30 @@ def warn_of_setup(model: Model, nmd: bool) -> None:
     """Warn of probable mistakes in the input. Collective."""
     locks = "" if nmd else locking(model.laws)
     of_loads = _nothing_acts(model), _nothing_holds(model), _upwards(model), _weight(model) or _softness(model)
-    found = [text for text in (*of_loads, angles_in_radians(model.laws), locks) if text]
+    found = [text for text in (*of_loads, angles_in_radians(model.laws), locks, *_reversed_interfaces(model)) if text]
     if model.comm.rank == 0:
         for text in found:
             warnings.warn(text, RuntimeWarning, stacklevel=3)
+
+
+def _reversed_interfaces(model: Model) -> list[str]:
+    """Of interfaces along planes, those that point from the second body to the first where these meet."""
+    p, mesh, found = model.particles, model.mesh, []
+    field_of = np.array(model._velocity_fields)[p.material]
+    for entry in [one for one in model._field_contacts if one["interface"]["kind"] == "Plane"]:
+        bodies = [field_of == entry[name] for name in ("first", "second")]
+        nodes = np.intersect1d(*(mesh.cells[p.cell[body]] for body in bodies))
+        near = np.isin(mesh.cells[p.cell], nodes).any(axis=1)
+        along = p.position @ np.array(entry["interface"]["normal"])
+        sums = [(along[body & near].sum(), np.count_nonzero(body & near)) for body in bodies]
+        (first, n), (second, m) = np.array(model.comm.allgather(sums)).sum(axis=0)
+        if n and m and second / m < first / n:
+            found.append(
+                f"where velocity fields {entry['first']} and {entry['second']} meet, the soil of the second lies behind that of the "
+                f"first along the interface {entry['interface']['normal']}, which points from the first to the second: turn it round, "
+                "or exchange first and second"
+            )
+    return found
 
 
 def _nothing_acts(model: Model) -> str:

@@ -331,3 +331,14 @@ def test_a_run_says_how_deep_soil_sinks_into_a_soft_contact_and_what_helps(penal
     assert all(
         "rigid surface 0 (Plane)" in text and "penalty=1 of add_contact in place of 0.2" in text for text in texts
     )
+
+
+def test_soil_that_is_placed_inside_of_a_surface_later_is_refused_when_the_run_begins():
+    model = mpm.Model(box((12, 8), (1.2, 0.8)), mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed_points([(0.6, 0.2)], [1e-4], density=1000.0)
+    model.add_contact(mpm.Box((0.4, 0.5), (0.8, 0.6)))
+    model.seed_points([(0.6, 0.55)], [1e-4], density=1000.0)  # 0.05 m deep, with a radius of 0.005 m
+    for run in (lambda: model.explicit(0.01), lambda: model.implicit(0.01, dt=0.01)):
+        with pytest.raises(mpm.InputError, match=r"overlaps the soil by 0\.055 m"):
+            run()
+    assert model.steps == 0

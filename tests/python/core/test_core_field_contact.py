@@ -1,5 +1,7 @@
 """Contact between velocity fields: a block that slides on a layer or sticks to it, impacts, and a body that falls on another."""
 
+import warnings
+
 import numpy as np
 import pytest
 from core_cases import box
@@ -179,3 +181,22 @@ def test_fields_touch_once():
     model, _ = block_on_layer(0.0, 0.0, mesh=ALIGNED)
     with pytest.raises(mpm.InputError, match="in contact already"):
         model.add_field_contact((0.0, 1.0), first=1, second=0)
+
+
+@pytest.mark.parametrize("interface, first", [((0.0, -1.0), 0), ((0.0, 1.0), 1), (mpm.Plane((0, 0.3), (0, -1)), 0)])
+def test_an_interface_that_points_the_wrong_way_is_noticed(interface, first):
+    """A block on the ground would sink into it and then be held as in tension."""
+    elastic = mpm.LinearElastic(young=1e6, poisson=0.2)
+    for direction, reversed_ in ((interface, True), ((0.0, 1.0 if first == 0 else -1.0), False)):
+        model = mpm.Model(box((12, 8), (1.2, 0.8)), [elastic] * 2, velocity_fields=[0, 1])
+        for (low, high), (bottom, top), material in (((0, 24), (0, 6), 0), ((8, 16), (6, 10), 1)):
+            columns, rows = np.meshgrid(np.arange(low, high), np.arange(bottom, top))
+            points = (np.column_stack([columns.ravel(), rows.ravel()]) + 0.5) * 0.05
+            model.seed_points(points, np.full(len(points), 0.05**2), density=1000.0, material=material)
+        model.fix(3)
+        model.set_gravity((0, -10.0))
+        model.add_field_contact(direction, first=first, second=1 - first)
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            next(iter(model.explicit(1e-3, every_steps=1)))
+        assert any("turn it round" in str(one.message) for one in found) == reversed_
