@@ -1,20 +1,13 @@
 """What holds for every study: its help, the file that repeats a run, and the page of a run."""
 
-import importlib
 import json
-import os
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from browser import NEEDED, move_slider, open_page, picture, started
 from matplotlib.figure import Figure
-
-STUDIES = Path(__file__).parents[3] / "studies"
-sys.path.insert(0, str(STUDIES))
+from study_main import NAMES, ON_TWO_RANKS, main
 
 SMALL = {
     "balance": "--cell-size 0.5 --mesh fitted --particles-per-cell 1 --time 0.02 --frames 2",
@@ -50,7 +43,6 @@ SMALL = {
     "verification": "--quick --cases column",
 }
 """Each study at a size that takes a second or less; a new study needs its line here."""
-ON_TWO_RANKS = ("balance",)
 WITH_PARTICLES = (
     "balance",
     "barrier",
@@ -68,34 +60,9 @@ WITH_PARTICLES = (
     "slope_schemes",
     "wall",
 )
-NAMES = sorted(
-    [path.stem for path in STUDIES.glob("*.py")] + [path.parent.name for path in STUDIES.glob("*/__main__.py")]
-)
 WITHOUT_PICTURES = ("scaling", "verification")
 """The latter has pictures of each case, and one file of results for all"""
 TIMED = re.compile("seconds|date$|per_second|finished$|versions|not_written|^output$|^parameters_file$")
-
-
-def main(name, arguments):
-    """Run a study in this process, or on two ranks if it needs them."""
-    if name in ON_TWO_RANKS and "--help" not in arguments:
-        launch = ["mpirun", "-n", "2", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", sys.executable]
-        # What MPI has put into the environment of this process, past os.environ, is not for another run of it.
-        root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-        command = [*launch, STUDIES / f"{name}.py", *map(str, arguments)]
-        return subprocess.run(command, timeout=120, env={**os.environ, **root}).returncode
-    if (STUDIES / f"{name}.py").exists():
-        module = importlib.import_module(name)
-    else:
-        sys.path.insert(0, str(STUDIES / name))
-        spec = importlib.util.spec_from_file_location(f"{name}_main", STUDIES / name / "__main__.py")
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-    program, sys.argv[0] = sys.argv[0], f"{name}.py"
-    try:
-        return module.main([str(word) for word in arguments])
-    finally:
-        sys.argv[0] = program
 
 
 def untimed(value):
