@@ -36,6 +36,7 @@ SMALL = [
     "6",
     "--time",
     "0.6",
+    "--no-pictures",
 ]
 
 
@@ -62,8 +63,9 @@ def test_a_restarted_slope_ends_as_the_one_that_never_stopped(tmp_path):
     assert slope(whole).returncode == 0
     first = slope(halves, "--checkpoint-every", "40")
     assert first.returncode == 0, first.stderr
-    second = slope(halves, "--restart", str(halves / "checkpoint.h5"))
+    second = slope(halves, "--restart", str(halves / "checkpoint.h5"), "--pictures")
     assert second.returncode == 0, second.stderr
+    assert (halves / "figure_6_crest.png").exists()
     assert "going on from" in second.stdout
     one, other = final_particles(whole / "particles"), final_particles(halves / "particles-2")
     for name in one:
