@@ -1,5 +1,6 @@
 """What holds for every study: its help, the file that repeats a run, and the page of a run."""
 
+import importlib
 import json
 import re
 
@@ -20,7 +21,7 @@ SMALL = {
     "cost": "--meshes 1 --mesh fitted --cell-size 0.5 --particles-per-cell 1 --water-modulus 1e6",
     "coupled_slope": "--cell-size 0.5 --width 6 --depth 2 --particles-per-cell 1 --time 0.02 --frames 2 --unit-weight 20e3 "
     "--displacement 1e-6",
-    "drawdown": "--cell-size 3 --elements P1 --days 4 --factor-times 1",
+    "drawdown": "--cell-size 3 --elements P1 --days 1 --factor-times 1",
     "earthquake": "--cell-size 2.5 --level 10 --soil-depth 5 --stiff-depth 5 --particles-per-cell 1 --motion ricker "
     "--peak 1 --duration 1 --rest 0 --frames 2",
     "element_test": "--steps 5",
@@ -30,8 +31,8 @@ SMALL = {
     "footing_push": "--cell-size 0.1 --particles-per-cell 1 --penetration 0.01 --speed 5e-3 --frames 2",
     "handover": "--time 0.02 --mesh fitted --cell-size 0.5 --particles-per-cell 1",
     "liquefaction": "--cell-size 1 --particles-per-cell 3 --time 0.02 --frames 4",
-    "locking": "--cases cook,footing,slope --schemes implicit --meshes 1 --reference-mesh 1",
-    "rain": "--cell-size 3 --elements P1 --days 3 --factor-times 1",
+    "locking": "--cases footing,slope --schemes implicit --meshes 1 --reference-mesh 1",
+    "rain": "--cell-size 3 --elements P1 --days 1 --factor-times 1",
     "retrogression": "--meshes one --cell-size 3 --time 0.2 --frames 2",
     "runout": "--cell-size 16 --spacing 8 --thickness 12 --time 0.5 --frames 2",
     "safety": "--cell-size 0.5 --meshes 1 --elements P1 --no-without-dilation --start 0.9",
@@ -60,6 +61,21 @@ WITH_PARTICLES = (
     "slope_schemes",
     "wall",
 )
+WITH_FILM = (
+    "barrier",
+    "cone",
+    "consolidation",
+    "drawdown",
+    "earthquake",
+    "embankment",
+    "footing_push",
+    "liquefaction",
+    "rain",
+    "retrogression",
+    "seepage",
+    "slope",
+    "wall",
+)
 WITHOUT_PICTURES = ("scaling", "verification")
 """The latter has pictures of each case, and one file of results for all"""
 TIMED = re.compile("seconds|date$|per_second|finished$|versions|not_written|^output$|^parameters_file$")
@@ -70,6 +86,14 @@ def untimed(value):
     if isinstance(value, dict):
         return {key: untimed(one) for key, one in value.items() if not TIMED.search(key)}
     return [untimed(one) for one in value] if isinstance(value, list) else value
+
+
+@pytest.fixture(scope="module", autouse=True)
+def short_films():
+    """A frame of the flow takes a second to draw."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(importlib.import_module("seepage"), "FILM_FRAMES", 3)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +137,7 @@ def test_a_run_is_repeated_by_its_file_of_parameters_even_without_pictures(name,
 
     monkeypatch.setattr(Figure, "savefig", fail)
     assert code == 0
+    assert len([path for path in folder.iterdir() if path.suffix in (".mp4", ".gif")]) == (name in WITH_FILM)
     text = (folder / "parameters.toml").read_text()
     assert f"studies/run {name} --parameters" in text
     assert main(name, ["--parameters", folder / "parameters.toml", "--output", tmp_path]) == 0

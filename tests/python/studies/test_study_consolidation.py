@@ -142,14 +142,13 @@ def test_loads_in_stages_settle_as_the_sum_of_olsons_ramps(tmp_path):
     rows = ((0, 0), (0.1, 20e3), (0.3, 20e3), (0.4, 50e3), (0.6, 50e3), (0.60001, 30e3))
     words = ["top=" + ",".join(f"{factor * DAYS}:{load}" for factor, load in rows)]
     arguments = ["--site", tmp_path / "layer.toml", "--days", 0.8 * DAYS, "--first-step", 1.5e-3 * DAYS, "--growth", 1.2,
-                 "--frames", 1, "--particles", "--output", tmp_path / "results", "--pressures", *words]  # fmt: skip
+                 "--frames", 1, "--no-film", "--particles", "--output", tmp_path / "results", "--pressures", *words]  # fmt: skip
     assert consolidation.main([str(word) for word in arguments]) == 0
     days, *found = _history(tmp_path / "results", "time_days", "settlement_middle_m", "settlement_middle_particles_m")
     expected = _settled(days / DAYS, [(0, 0.1, 20e3), (0.3, 0.4, 30e3), (0.6, 0.60001, -20e3)])
     for one in found:
         assert np.abs(one - expected).max() < 0.01 * expected.max()
     assert all(np.abs(days / DAYS - corner).min() < 1e-8 for corner in (0.1, 0.3, 0.4, 0.6))  # where steps end
-    assert len(list((tmp_path / "results").glob("film.*"))) == 1
 
 
 STAGES = """
@@ -175,7 +174,7 @@ def test_layers_that_are_placed_in_stages_settle_the_clay_below_as_their_weights
     last = f"[[stages]]\nday = {0.6 * DAYS}\nexcavate = ['second']\nname = 'dug away'\n"
     (tmp_path / "layer.toml").write_text(CLAY + STAGES + "".join(stages) + last)
     arguments = ["--site", tmp_path / "layer.toml", "--days", 0.8 * DAYS, "--first-step", 1.5e-3 * DAYS, "--growth", 1.2,
-                 "--frames", 2, "--particles", "--output", tmp_path / "results"]  # fmt: skip
+                 "--frames", 2, "--no-film", "--particles", "--output", tmp_path / "results"]  # fmt: skip
     assert consolidation.main([str(word) for word in arguments]) == 0
     days, *both = _history(tmp_path / "results", "time_days", "settlement_middle_m", "settlement_middle_particles_m")
     ramps = [(0.1, 0.2, 4e3), (0.4, 0.5, 4e3), (0.6, 0.60001, -4e3)]

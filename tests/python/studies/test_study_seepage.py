@@ -82,9 +82,10 @@ def test_half_of_k_h_flows_under_a_pile_down_to_the_middle_of_a_layer():
     assert flow.inflow("downstream") == pytest.approx(-flow.inflow("upstream"), rel=1e-9)
 
 
-def test_the_history_of_a_drawdown_balances(tmp_path):
+def test_the_history_of_a_drawdown_balances(tmp_path, monkeypatch):
     import seepage
 
+    monkeypatch.setattr(seepage, "FILM_FRAMES", 5)
     folder = tmp_path / "results"
     arguments = ["--cell-size", "2", "--days", "20", "--frames", "2", "--output", str(folder)]
     assert seepage.main(arguments) == 0

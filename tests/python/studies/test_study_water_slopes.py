@@ -53,7 +53,7 @@ def test_a_wrong_site_is_named(old, new, words, tmp_path):
 def test_a_drawdown_that_is_followed_long_ends_at_the_limit_of_a_slow_one(tmp_path):
     # The same boundary conditions for ever: the flow in time becomes the steady one, and with it the factor.
     path = site("drawdown", tmp_path, ("= 3e-7", "= 1e-4"), ("conductivity = 1e-7", "conductivity = 1e-4"))
-    summary, rows = run("drawdown", path, tmp_path, "--days 400")
+    summary, rows = run("drawdown", path, tmp_path, "--days 400 --no-pictures")
     slow, fast = (limit["factor_of_safety"] for limit in summary["limits"])
     assert rows["factor_of_safety"][-1] == pytest.approx(slow, rel=0.006)  # the width of the last step
     assert fast < rows["factor_of_safety"].min() * 1.006
@@ -65,7 +65,7 @@ def test_a_drawdown_in_no_time_begins_at_the_limit_without_drainage(tmp_path):
     path = site(
         "drawdown", tmp_path, ("= 3e-7", "= 1e-11"), ("conductivity = 1e-7", "conductivity = 1e-11"), ("[3.0,", "[0.1,")
     )
-    summary, rows = run("drawdown", path, tmp_path, "--days 0.1")
+    summary, rows = run("drawdown", path, tmp_path, "--days 0.1 --no-pictures")
     slow, fast = (limit["factor_of_safety"] for limit in summary["limits"])
     assert rows["factor_of_safety"][-1] == pytest.approx(fast, rel=0.012)
     assert fast < 0.8 * slow
@@ -102,10 +102,9 @@ def test_the_slide_begins_in_equilibrium_and_gathers_speed(water, tmp_path):
 
 def test_a_slope_that_stands_does_not_slide(tmp_path):
     path = site("drawdown", tmp_path, ("cohesion = 4e3", "cohesion = 40e3"), ("cohesion = 8e3", "cohesion = 40e3"))
-    summary, rows = run("drawdown", path, tmp_path, "--days 3 --slide")
+    summary, rows = run("drawdown", path, tmp_path, "--days 3 --slide --no-pictures")
     assert rows["factor_of_safety"].min() > 1 and summary["failure_time_days"] is None
     assert "largest_displacement_m" not in summary
-    assert len(list((tmp_path / "results").glob("flow.*"))) == 1
 
 
 # --- rain ------------------------------------------------------------------------------------------------------------
@@ -114,7 +113,7 @@ TABLE = "[[0.0, 0.5], [2.0, 100.0], [10.0, 100.0], [12.0, 0.5]]"
 
 
 def test_rain_takes_the_suction_away_that_holds_a_slope(tmp_path):
-    summary, rows = run("rain", site("rain", tmp_path), tmp_path, "--days 10")
+    summary, rows = run("rain", site("rain", tmp_path), tmp_path, "--days 10 --no-pictures")
     factors = rows["factor_of_safety"]
     without = summary["limits"][0]["factor_of_safety"]
     assert factors[0] > 1.2 * without
@@ -123,9 +122,8 @@ def test_rain_takes_the_suction_away_that_holds_a_slope(tmp_path):
 
 
 def test_a_slope_in_steady_rain_keeps_its_factor(tmp_path):
-    summary, rows = run(
-        "rain", site("rain", tmp_path, (TABLE, "[[0.0, 0.5], [8.0, 0.5]]")), tmp_path, "--days 8 --no-suction"
-    )
+    path = site("rain", tmp_path, (TABLE, "[[0.0, 0.5], [8.0, 0.5]]"))
+    summary, rows = run("rain", path, tmp_path, "--days 8 --no-suction --no-pictures")
     factors, without = rows["factor_of_safety"], summary["limits"][0]["factor_of_safety"]
     assert len(factors) == 5 and factors == pytest.approx(without, rel=1e-9)
 
