@@ -15,7 +15,17 @@ from fenics_bridge.fem.geometry import weighted
 from fenics_bridge.fem.supports import tagged_facets
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.types import MeshTags
-from fenics_bridge.water.boundary import Flux, Head, Rain, Reservoir, SeepageFace, WaterBoundary, mistake_in, value_at
+from fenics_bridge.water.boundary import (
+    Flux,
+    Head,
+    Rain,
+    Reservoir,
+    SeepageFace,
+    WaterBoundary,
+    mean_over,
+    mistake_in,
+    value_at,
+)
 
 
 class _Held(NamedTuple):
@@ -105,11 +115,11 @@ class AppliedBoundary:
         """Prescribed inflows over their unit against a test function, as a UFL form; 0 where there are none."""
         return sum(self._over(held.density * test, held.tags) for held in self.held if held.rate is not None)
 
-    def set_time(self, time: float) -> None:
-        """Give the prescribed inflows their values at a time [s]."""
+    def set_time(self, time: float, dt: float = 0.0) -> None:
+        """Give the prescribed inflows their values at a time [s], or of tables their means over the dt [s] before it."""
         for held in self.held:
             if held.rate is not None:
-                held.rate.value = value_at(held.condition.rate, time) / self.unit
+                held.rate.value = mean_over(held.condition.rate, time - dt, time) / self.unit
 
     def bounds(self, time: float) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
         """Which dofs have a prescribed pressure head, these heads, and upper bounds of the others [m], at a time [s]."""

@@ -1,7 +1,8 @@
 """Boundary conditions of the pore water, by facet tag; where none is given the boundary is impervious.
 
 Values may be numbers or, for flows in time, functions of the time [s] or tables ((time, value), ...) that are joined by
-straight lines; before the first and after the last time their end values hold.
+straight lines; before the first and after the last time their end values hold. Over a step, water enters at the mean rate of a
+table, and the level at the end of the step holds.
 """
 
 from __future__ import annotations
@@ -78,6 +79,16 @@ def value_at(value: Value, time: float) -> float:
         times, values = np.transpose(np.asarray(value, dtype=float))
         return float(np.interp(time, times, values))
     return float(value)
+
+
+def mean_over(value: Value, start: float, end: float) -> float:
+    """Mean of a number or table of a boundary condition between two times [s]; of a function, its value at the end."""
+    if callable(value) or np.ndim(value) == 0 or not end > start:
+        return value_at(value, end)
+    times, values = np.transpose(np.asarray(value, dtype=float))
+    corners = np.array([start, *times[(times > start) & (times < end)], end])
+    there = np.interp(corners, times, values)
+    return float(np.sum(0.5 * (there[1:] + there[:-1]) * np.diff(corners)) / (end - start))
 
 
 def listed(comm: MPI.Comm, boundary: Iterable[WaterBoundary]) -> list[WaterBoundary]:

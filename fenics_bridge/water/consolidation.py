@@ -295,7 +295,7 @@ class Consolidation(ConsolidationResults):
         end, stored = self.time + dt, self.stored_water()
         load = self.load_at(end)
         external = self._external_at(end)
-        self._applied.set_time(end)
+        self._applied.set_time(end, dt)
         self._terms.dt.value = self.points.duration = dt
         if self._projection is not None:
             self._projection.write(self._terms.projection, dt, None if self.motion is None else self.motion.method.beta)

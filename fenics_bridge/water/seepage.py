@@ -202,7 +202,7 @@ class Seepage:
         return not failure
 
     def _solve(self, problem: Any) -> Any:
-        self._applied.set_time(self.time)
+        self._applied.set_time(self.time, float(self._dt.value) if problem is self._transient else 0.0)
         height, (fixed, values, upper) = self._applied.height, self._applied.bounds(self.time)
         heads = np.concatenate([values[fixed] + height[fixed], height])
         low, high = heads.min(initial=np.inf), heads.max(initial=-np.inf)

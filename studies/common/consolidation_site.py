@@ -31,10 +31,10 @@ import mpm_core as mpm
 from fenics_bridge import water
 from fenics_bridge.water.boundary import value_at
 
-from .consolidation_stages import GroundStage, Table, corners_of, pressure_table, stages_of
+from .consolidation_stages import GroundStage, Table, pressure_table, stages_of
 from .site_file import law_at, read_toml, supports_of
 from .slope_case import GRAVITY
-from .water_site import DAY, condition, porous_soil
+from .water_site import DAY, condition, corners_of, porous_soil, times_of
 
 KEYS = ("mesh", "cell_size", "constants", "soils", "supports", "boundaries", "pressures", "points", "stages")
 BALANCED = 1e-9
@@ -65,8 +65,15 @@ class ConsolidationSite:
         return list(self.stages[0].boundary.values())
 
     def corners(self, apart: float) -> list[float]:
-        """Times [s] at which loads, levels or soils change their rate; those that follow within `apart` [s] make a jump."""
-        return corners_of(self.pressures.values(), self.stages, apart)
+        """Times [s] at which loads, levels or soils change their rate; those that follow within `apart` [s] make a jump.
+
+        Stages begin in any case.
+        """
+        starts = {stage.start for stage in self.stages}
+        ends = {stage.start + stage.duration for stage in self.stages}
+        rows = {time for table in self.pressures.values() for time, _ in table}
+        water_rows = times_of(one for stage in self.stages for one in stage.boundary.values())
+        return corners_of(starts | ends | rows | water_rows, apart, always=starts)
 
     def stage_at(self, time: float) -> GroundStage | None:
         """The stage that begins at a time [s], after the beginning; None where none does."""

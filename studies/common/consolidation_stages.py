@@ -141,22 +141,3 @@ def _days(row: dict, key: str, where: str, default: float | None = None) -> floa
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or value < 0:
         raise mpm.InputError(f"{where}: {key} is {value!r}, expected a number of days from 0 on")
     return float(value)
-
-
-def corners_of(pressures: Iterable[Table], stages: Sequence[GroundStage], apart: float) -> list[float]:
-    """Times [s] at which a rate changes, where steps should end: the rows of all tables, beginnings and ends of stages.
-
-    Rows that follow another within `apart` [s] are a jump, which belongs to the step after it; stages begin in any case.
-    """
-    levels = [
-        getattr(one, key, None) for stage in stages for one in stage.boundary.values() for key in ("level", "rate")
-    ]
-    tables = [*pressures, *(level for level in levels if isinstance(level, tuple))]
-    starts = {stage.start for stage in stages}
-    times = starts | {time for table in tables for time, _ in table}
-    times |= {stage.start + stage.duration for stage in stages}
-    kept = [0.0]
-    for time in sorted(time for time in times if time > 0):
-        if time in starts or time - kept[-1] > apart:
-            kept.append(time)
-    return kept[1:]

@@ -21,7 +21,7 @@ from fenics_bridge.water.boundary import value_at
 from fenics_bridge.water.soils import WATER_WEIGHT
 
 from .site_file import Site, read_toml, site_of
-from .water_site import SOIL_KEYS, condition, porous_soil
+from .water_site import SOIL_KEYS, condition, corners_of, porous_soil, times_of
 
 KEYS = ("mesh", "cell_size", "constants", "soils", "supports", "boundaries")
 MECHANICAL = ("mesh", "cell_size", "constants", "supports")
@@ -91,8 +91,7 @@ class SlopeSite:
 
     def times(self, end: float) -> list[float]:
         """Times [s] up to an end at which a table of the boundary conditions has a corner."""
-        tables = [value for c in self.boundary for value in (getattr(c, "level", None), getattr(c, "rate", None))]
-        return sorted({time for table in tables if isinstance(table, tuple) for time, _ in table if 0 < time <= end})
+        return [time for time in corners_of(times_of(self.boundary)) if time <= end]
 
     def boundary_at(self, time: float) -> list:
         """The boundary conditions with the values that they have at a time [s], for good."""

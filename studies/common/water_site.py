@@ -17,7 +17,7 @@ Example of a file:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -65,6 +65,27 @@ class WaterSite:
         )
 
 
+def times_of(boundary: Iterable[Any]) -> set[float]:
+    """Times [s] of the rows of all tables of boundary conditions."""
+    values = (getattr(one, key, None) for one in boundary for key in ("level", "rate"))
+    return {time for table in values if isinstance(table, tuple) for time, _ in table}
+
+
+def corners_of(times: Iterable[float], apart: float = 0.0, always: Container[float] = ()) -> list[float]:
+    """Times [s] after 0 at which a rate changes, where steps should end.
+
+    Args:
+        times: of the rows of tables, in any order.
+        apart: times that follow another within this [s] are left out: both rows are a jump, which belongs to the step after it.
+        always: times that are kept in any case.
+    """
+    kept = [0.0]
+    for time in sorted(time for time in times if time > 0):
+        if time in always or time - kept[-1] > apart:
+            kept.append(time)
+    return kept[1:]
+
+
 def in_days(time: float) -> str:
     """A time [s] in words: "1 day", "2.5 days", "1200 days"."""
     days = time / DAY
@@ -86,8 +107,7 @@ def read_water_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) 
     domain, cell_tags, facet_tags = site_mesh(table, path, comm, cell_size)
     soils = {name: porous_soil(given, f"{path}: soils.{name}") for name, given in table["soils"].items()}
     boundary = [condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()]
-    varies = any(isinstance(getattr(c, key, None), tuple) for c in boundary for key in ("level", "rate"))
-    return WaterSite(domain, cell_tags, facet_tags, soils, boundary, varies)
+    return WaterSite(domain, cell_tags, facet_tags, soils, boundary, varies=bool(times_of(boundary)))
 
 
 def porous_soil(given: dict, where: str) -> water.PorousSoil:
