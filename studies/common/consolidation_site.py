@@ -86,6 +86,8 @@ class ConsolidationSite:
     def at_rest(self, element: water.Element, nmd: bool = False) -> water.Consolidation:
         """The ground at the beginning: in equilibrium under its weight, the pressures at time 0 and the steady flow. Collective.
 
+        Above the water table its water has the suction of the steady flow, which saturated soil bears.
+
         Args:
             element: elements of displacement and pressure.
             nmd: average volumetric strains of linear elements over nodes.
@@ -112,14 +114,15 @@ class ConsolidationSite:
             cell_tags=cell_tags,
             options_prefix="rest_",
         )
-        fem.reconfigure(off=off, pore_pressure=flow.pore_pressure())
+        pressure = flow.pore_pressure(suction=True)
+        fem.reconfigure(off=off, pore_pressure=pressure)
         fem.solve(self.load(0.0))
         if not fem.converged:
             raise mpm.RunError("the ground has no equilibrium under its weight and the initial pressures")
         model = water.Consolidation(domain, self.laws, self.soils, facet_tags, self.supports, self.boundary, load=self.load,
                                     element=element, nmd=nmd, cell_tags=cell_tags)  # fmt: skip
         model.reconfigure(off=off)
-        model.initialise(fem, flow if body is self.mesh else flow.pore_pressure())
+        model.initialise(fem, pressure)
         return model
 
     def particles(self, fem: water.Consolidation, per_cell: int, nmd: bool = False) -> mpm.Model:
