@@ -137,6 +137,31 @@ class AppliedBoundary:
                 upper[dofs] = np.minimum(upper[dofs], getattr(condition, "ponding", 0.0))
         return fixed, values, upper
 
+    def lowest_outlet(self, time: float) -> float | None:
+        """Total head [m] at which water first leaves, where no head is prescribed at a time [s]; None where one is. Collective.
+
+        Raises:
+            InputError: the conditions determine no steady pressure: no head is prescribed, and no water enters, or it cannot
+                leave. Raised on all ranks alike.
+        """
+        comm = self._space.mesh.comm
+        self.set_time(time)
+        fixed, _, upper = self.bounds(time)
+        heads = comm.allgather((bool(fixed.any()), float((self.height + upper).min(initial=np.inf))))
+        if any(known for known, _ in heads):
+            return None
+        lowest = min(head for _, head in heads)
+        rates = [fem.assemble_scalar(held.total) for held in self.held if held.rate is not None]
+        enters, size = np.sum(comm.allgather((sum(rates), sum(map(abs, rates)))), axis=0)
+        problem = ""
+        if not np.isfinite(lowest):
+            problem = "and water can leave nowhere"
+        elif not enters > 1e-9 * size:
+            problem = f"and the rates of Flux and Rain add up to {self.unit * enters:.3g} m3/s, expected water that has to leave"
+        text = "boundary: the steady pressure is undetermined: no head is prescribed (by Head, or by a Reservoir whose level reaches "
+        agree(comm, f"{text}its facets), {problem}" if problem else None)
+        return lowest
+
     def inflow(self, facet_tag: int | str | None, reaction: NDArray[np.float64]) -> float:
         """Water that enters through the facets of a tag; a node where several conditions meet counts for the first of them.
 
