@@ -38,7 +38,9 @@ def standing_water(
     agree(domain.comm, None if dim == 2 else f"domain has {dim} dimensions, expected a plane section")
     reservoirs = [condition for condition in boundary if isinstance(condition, Reservoir)]
     agree(domain.comm, None if reservoirs else "boundary has no Reservoir, expected one or more")
-    grounds = [(condition, ground_line(domain, facet_tags, condition.facet_tag)) for condition in reservoirs]
+    grounds = [
+        (condition, line) for condition in reservoirs for line in ground_lines(domain, facet_tags, condition.facet_tag)
+    ]
     close = 1e-9 * max(
         (np.ptp(line) for _, ground in grounds for line in ground), default=0.0
     )  # round-off of coordinates
@@ -54,8 +56,13 @@ def standing_water(
     return pressure
 
 
-def ground_line(domain: Mesh, facet_tags: MeshTags, tag: int | str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The surface at the facets of a tag as a line, in a plane section. Collective.
+Line = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+def ground_lines(domain: Mesh, facet_tags: MeshTags, tag: int | str) -> list[Line]:
+    """The surface at the facets of a tag as lines of facets that meet, in a plane section. Collective.
+
+    Vertical facets, on which nothing stands, are left out.
 
     Args:
         domain: mesh of the body.
@@ -63,16 +70,20 @@ def ground_line(domain: Mesh, facet_tags: MeshTags, tag: int | str) -> tuple[NDA
         tag: number or name of the tag.
 
     Returns:
-        Coordinates x, rising, and the highest y at each of them [m], both of shape (k,).
+        Coordinates x, rising, and y of the ends of the facets of each line [m], both of shape (k,).
 
     Raises:
         InputError: no facet has the tag. Raised on all ranks alike.
     """
     facets = tagged_facets(domain.comm, facet_tags, tag, "boundary")
-    nodes = domain.geometry.x[facet_nodes(domain, facets).ravel()][:, :2]
-    x, y = np.concatenate(domain.comm.allgather(nodes)).T
-    size = max(np.ptp(x), np.ptp(y))
-    order = np.lexsort((-y, np.round(x / (1e-9 * size))))
-    x, y = x[order], y[order]
-    first = np.concatenate([[True], np.diff(x) > 1e-9 * size])
-    return x[first], y[first]
+    nodes = domain.geometry.x[facet_nodes(domain, facets)][:, :, :2]
+    ends = np.concatenate(domain.comm.allgather(nodes))  # (k, 2, 2), those of ghosts several times
+    close = 1e-9 * max(np.ptp(ends, axis=(0, 1)))
+    ends = np.take_along_axis(ends, np.argsort(ends[:, :, :1], axis=1), axis=1)
+    ends = ends[ends[:, 1, 0] - ends[:, 0, 0] > close]
+    if not len(ends):
+        return []
+    ends = ends[np.unique(np.round(ends.reshape(-1, 4) / close), axis=0, return_index=True)[1]]  # from left to right
+    gaps = np.flatnonzero(np.abs(ends[1:, 0] - ends[:-1, 1]).max(axis=1) > close) + 1
+    lines = (np.concatenate([line[:, 0], line[-1:, 1]]) for line in np.split(ends, gaps))
+    return [(line[:, 0], line[:, 1]) for line in lines]

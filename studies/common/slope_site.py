@@ -56,12 +56,13 @@ class SlopeSite:
         return water.standing_water(domain, facet_tags, self.boundary) if any_there else None
 
     def ground(self) -> list[tuple]:
-        """Reservoirs, each with the line of the ground below it: (condition, x, y). Collective."""
+        """Reservoirs, each with a line of the ground below it, of which it may have several: (condition, x, y). Collective."""
         domain, _, facet_tags = self.body
         return [
-            (c, *water.ground_line(domain, facet_tags, c.facet_tag))
+            (c, *line)
             for c in self.boundary
             if isinstance(c, water.Reservoir)
+            for line in water.ground_lines(domain, facet_tags, c.facet_tag)
         ]
 
     def free_water(self, time: float) -> Callable:
