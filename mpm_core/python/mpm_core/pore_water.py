@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._core import InputError
+from .anisotropy import tensors_of_laws
 from .checks import positive
 from .collective import collectively
 from .conditions import Conditions
@@ -19,6 +20,7 @@ from .parameter_fields import Field
 from .particles import Particles
 from .retention import curves_of_laws, joined
 from .setup_warnings import warn_of_water_weight
+from .water_checks import STANDARD_GRAVITY, require_pores, require_soil, require_standard_gravity
 
 History: TypeAlias = list[tuple[float, float]]
 """Pairs of time [s] and value, of rising times, joined by straight lines; one pair for a value that stays"""
@@ -29,10 +31,6 @@ presses on the soil"""
 
 Value: TypeAlias = float | Sequence[tuple[float, float]]
 """A number, or a table ((time [s], value), ...) of rising times, before and after which the end values hold"""
-
-
-STANDARD_GRAVITY = 9.81
-"""Gravity by which the unit weight of water is divided to get its density [m/s2]"""
 
 
 class WaveSpeeds(NamedTuple):
@@ -75,7 +73,8 @@ class PoreWater(Conditions):
             porosity: volume of the pores over that of the soil [-], in (0, 1); it follows the volume of the particles.
             conductivity: hydraulic conductivity k [m/s], positive. Both: a number; an array, shape (n,), in the order of
                 ``particles``; a function of positions, shape (n, D); or {cell tag or name: number}.
-            unit_weight: of water [N/m3].
+            unit_weight: of water [N/m3] under a gravity of 9.81 m/s2, which gives its density; water that stands up to a level
+                needs that gravity.
             modulus: bulk modulus of water [Pa]; may be infinite.
             kozeny_carman: let the conductivity follow the porosity as n^3 / (1 - n)^2.
             suction_limit: largest suction of the water [Pa], 0 or more, in explicit runs: where soil grows beyond it, its pores
@@ -106,7 +105,7 @@ class PoreWater(Conditions):
             water.suction_limit = float(suction_limit)
             water.drained_surface = bool(drained_surface)
             n, k = self._values("porosity", porosity), self._values("conductivity", conductivity)
-            _require_pores(n, k)
+            require_pores(n, k)
             self._set_retention(water, curves_of_laws(retention, self.laws))
             water.anisotropy = tensors_of_laws(anisotropy, len(self.laws), self.mesh.dim)
             if any(isinstance(law, _core.Undrained) for law in self.laws):
@@ -372,10 +371,10 @@ class PoreWater(Conditions):
             raise InputError("the model has no pore water, expected add_water() before")
 
     def _check_water(self) -> None:
-        """Refuse particles without pores, such as those seeded after `add_water`. Collective."""
+        """Refuse particles without pores, such as those seeded after `add_water`, or too light, and another gravity. Collective."""
         if self._core.water is not None:
-            p = self.particles
-            collectively(self.comm, lambda: _require_pores(p.porosity, p.conductivity))
+            collectively(self.comm, lambda: require_soil(self))
+            require_standard_gravity(self)
 
 
 def history_of(name: str, value: Value, least: float = -np.inf) -> History:
@@ -396,54 +395,9 @@ def history_of(name: str, value: Value, least: float = -np.inf) -> History:
     return [(float(time), float(number)) for time, number in pairs]
 
 
-def _require_pores(porosity: NDArray, conductivity: NDArray) -> None:
-    bad = ~((porosity > 0) & (porosity < 1))
-    if bad.any():
-        raise InputError(f"porosity is {porosity[bad][0]}, expected more than 0 and less than 1 in all particles")
-    bad = ~((conductivity > 0) & np.isfinite(conductivity))
-    if bad.any():
-        raise InputError(f"conductivity is {conductivity[bad][0]} m/s, expected positive numbers in all particles")
-
-
 def refuse_water(body: PoreWater, scheme: str) -> None:
     """Raises InputError where a scheme would leave the flow of the pore water out."""
     if body._core.water is not None:
         raise InputError(
             f"the model has pore water, whose flow {scheme} does not support; use implicit() by Newton's method"
         )
-
-
-def tensors_of_laws(anisotropy: Any, laws: int, dim: int) -> list[list[list[float]]]:
-    """Tensors of the conductivity over its number for each law, (3, 3); nothing where all soil is isotropic.
-
-    Raises:
-        InputError: neither (D,) nor (D, D), nor one for each law, or a tensor that is not symmetric and positive.
-    """
-    if anisotropy is None:
-        return []
-    one_each = isinstance(anisotropy, (list, tuple)) and any(part is None or np.ndim(part) for part in anisotropy)
-    if one_each and len(anisotropy) != laws and None not in anisotropy and np.shape(anisotropy) == (dim, dim):
-        one_each = False  # a tensor, as lists
-    given = list(anisotropy) if one_each else [anisotropy] * laws
-    if len(given) != laws:
-        raise InputError(
-            f"anisotropy has {len(given)} entries, expected {dim} factors, or an entry for each of the {laws} laws"
-        )
-    return [_tensor(entry, dim) for entry in given]
-
-
-def _tensor(entry: Any, dim: int) -> list[list[float]]:
-    try:
-        values = np.ones(dim) if entry is None else np.asarray(entry, dtype=float)
-    except (TypeError, ValueError):
-        values = np.empty(0)
-    square = np.diag(values) if values.shape == (dim,) else values
-    good = square.shape == (dim, dim) and bool(np.all(np.isfinite(square))) and np.allclose(square, square.T)
-    if not (good and np.linalg.eigvalsh(square)[0] > 0):
-        raise InputError(
-            f"anisotropy is {entry!r}, expected {dim} positive factors, one along each axis, or a symmetric ({dim}, {dim}) tensor "
-            "with positive principal values"
-        )
-    tensor = np.eye(3)
-    tensor[:dim, :dim] = 0.5 * (square + square.T)
-    return tensor.tolist()

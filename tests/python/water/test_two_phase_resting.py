@@ -98,6 +98,7 @@ def test_a_step_after_conversion_moves_soil_and_water_as_before(dim, options):
 def test_a_step_after_conversion_under_standing_water_and_through_strata_is_that_before():
     def strata():
         model = flowing(2, anisotropy=[2.0, 0.5], drained_surface=True)
+        model.set_gravity((0.0, -9.81))
         model.stand_water(1.5)
         return model
 
