@@ -34,7 +34,7 @@ from fenics_bridge.water.boundary import value_at
 from .consolidation_stages import GroundStage, Table, pressure_table, stages_of
 from .site_file import law_at, read_toml, supports_of
 from .slope_case import GRAVITY
-from .water_site import DAY, condition, corners_of, porous_soil, times_of
+from .water_site import DAY, condition, corners_of, directions_of, porous_soil, times_of, vertical_conductivity
 
 KEYS = ("mesh", "cell_size", "constants", "soils", "supports", "boundaries", "pressures", "points", "stages")
 BALANCED = 1e-9
@@ -146,17 +146,11 @@ class ConsolidationSite:
             self.seed(model, soil, per_cell)
         bridge.apply_supports(model, self.supports)
         model.set_gravity((0.0, -GRAVITY))
-        anisotropy = [
-            soil.conductivity / np.ravel(soil.conductivity)[-1]
-            if soil is not None and np.ndim(soil.conductivity)
-            else None
-            for soil in self.soils.values()
-        ]
         pores = {soil: self.pores(soil) for soil in there}
         model.add_water(
             porosity={soil: porosity for soil, (porosity, _) in pores.items()},
             conductivity={soil: conductivity for soil, (_, conductivity) in pores.items()},
-            anisotropy=anisotropy if any(factors is not None for factors in anisotropy) else None,
+            anisotropy=directions_of(self.soils.values()),
         )
         if dry:
             model.hold_pore_pressure(water.WATERLESS, 0.0)
@@ -174,7 +168,7 @@ class ConsolidationSite:
     def pores(self, soil: str) -> tuple[float, float]:
         """Porosity [-] and vertical conductivity [m/s] of particles; those of another soil where it has none."""
         porous = self.soils[soil] or next(one for one in self.soils.values() if one is not None)
-        return porous.porosity, float(np.ravel(porous.conductivity)[-1])
+        return porous.porosity, vertical_conductivity(porous)
 
     def _require_stages_of_particles(self) -> None:
         for before, stage in zip(self.stages, self.stages[1:]):

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
 import mpm_core as mpm
@@ -147,6 +148,22 @@ def _of_strata(conductivity: Any, dip: float) -> Any:
     if not isinstance(conductivity, list) or len(conductivity) != 2:
         raise mpm.InputError(f"dip: conductivity is {conductivity!r} m/s, expected [along, across] the strata")
     return water.dipping(*conductivity, dip)
+
+
+def vertical_conductivity(soil: water.PorousSoil) -> float:
+    """Conductivity of a soil along the last axis [m/s], which particles have as a number."""
+    return float(np.ravel(soil.conductivity)[-1])
+
+
+def directions_of(soils: Iterable[water.PorousSoil | None]) -> list | None:
+    """Conductivities of particles over the vertical one, for `Model.add_water(anisotropy=)`: of each soil; None without any."""
+    factors = [
+        soil.conductivity / np.float64(vertical_conductivity(soil))
+        if soil is not None and np.ndim(soil.conductivity)
+        else None
+        for soil in soils
+    ]
+    return factors if any(factor is not None for factor in factors) else None
 
 
 def condition(name: str, given: dict, where: str) -> Any:

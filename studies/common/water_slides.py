@@ -29,7 +29,7 @@ from .options import add_choice, add_flag, add_number
 from .scenes import scene_of
 from .site_slides import add_slide_options, averages, slide, slide_pictures
 from .slope_site import SlopeSite
-from .water_site import DAY, in_days
+from .water_site import DAY, directions_of, in_days, vertical_conductivity
 from .water_slopes import Instant, lowest
 
 comm = MPI.COMM_WORLD
@@ -94,13 +94,35 @@ def let_water_flow(slope: SlopeSite, instant: Instant, model: mpm.Model) -> None
     """
     model.particles.set("traction", np.zeros_like(model.particles.position))
     soils = slope.porous
-    conductivity = {name: float(np.min(soil.conductivity)) for name, soil in soils.items()}
-    model.add_water(porosity={name: soil.porosity for name, soil in soils.items()}, conductivity=conductivity,
-                    unit_weight=WATER_WEIGHT, drained_surface=True)  # fmt: skip
+    tags = bridge.names_of(slope.site.cell_tags)
+    by_tag = {tag: soil for name, soil in soils.items() for tag in tags.get(name, (name,))}
+    directions = directions_of(by_tag[tag] for tag in slope.site.laws)
+    model.add_water(
+        porosity={name: soil.porosity for name, soil in soils.items()},
+        conductivity={name: vertical_conductivity(soil) for name, soil in soils.items()},
+        anisotropy=directions and 2 * directions,  # `handed_over` has two laws for each soil
+        unit_weight=WATER_WEIGHT,
+        drained_surface=True,
+    )
     model.set_pore_pressure(lambda points: np.maximum(instant.pore_pressure(points), 0.0))
-    levels = [value_at(c.level, instant.time) for c in slope.boundary if isinstance(c, Reservoir)]
-    if levels:
-        model.stand_water(max(levels))
+    reservoirs = [condition for condition in slope.boundary if isinstance(condition, Reservoir)]
+    if reservoirs:
+        model.stand_water(value_at(reservoirs[0].level, instant.time))
+
+
+def require_one_level(slope: SlopeSite, end: float) -> None:
+    """Require that all reservoirs have one level up to a time [s], since flowing water stands over particles up to one.
+
+    Raises:
+        InputError: they have different ones.
+    """
+    reservoirs = [condition for condition in slope.boundary if isinstance(condition, Reservoir)]
+    for time in (0.0, *slope.times(end), end):
+        levels = {condition.facet_tag: value_at(condition.level, time) for condition in reservoirs}
+        if levels and np.ptp(list(levels.values())) > 1e-9 * max(1.0, *map(abs, levels.values())):
+            texts = ", ".join(f"{level:g} m at {name!r}" for name, level in levels.items())
+            raise mpm.InputError(f"--slide-water is flows and the reservoirs have different levels, {texts} after {in_days(time)}; "
+                                 "expected one level, or --slide-water still")  # fmt: skip
 
 
 def handed_over(

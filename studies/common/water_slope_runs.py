@@ -19,7 +19,7 @@ from .site_slides import CAPTIONS as SLIDE_CAPTIONS
 from .slope_site import SlopeSite, read_slope_site
 from .summary import write_summary
 from .water_site import DAY, in_days
-from .water_slides import slide_of
+from .water_slides import require_one_level, slide_of
 from .water_slope_plots import CAPTIONS, slope_pictures
 from .water_slopes import failure_time, follow, lowest
 
@@ -38,13 +38,15 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
         limits_of: function of options, site and steady flow at the beginning; returns factors of safety to compare with, by name.
 
     Raises:
-        InputError: the site has no such boundary condition.
+        InputError: the site has no such boundary condition, or a slide in which water flows could not have its reservoirs.
     """
     start = perf_counter()
     folder = open_results(a, comm)
     slope = read_slope_site(a.site, comm, a.cell_size, a.slower)
     if not any(isinstance(condition, changing) for condition in slope.boundary):
         raise mpm.InputError(f"{a.site}: no boundary has {changing.__name__.lower()}, expected one or more")
+    if a.slide and a.slide_water == "flows":
+        require_one_level(slope, DAY * a.days)
     flow = slope.seepage()
     flow.solve()
     limits = limits_of(a, slope, flow)
