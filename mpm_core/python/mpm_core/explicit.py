@@ -15,6 +15,7 @@ from ._core import InputError, Integration, StressUpdate, Transfer
 from .checks import flag, member, positive, within
 from .energy import ADVICE, ADVICE_FOR, EnergyWatch
 from .failure_watch import FailureWatch
+from .load_watch import LoadWatch
 from .partition import keep_balance
 from .penetration import PenetrationWatch
 from .rayleigh import Rayleigh
@@ -130,7 +131,7 @@ def run_explicit(
         energy_limit, model.comm.rank == 0, lambda: swollen(model) or advice, noisy=options.moving_cells
     )
     failure = FailureWatch(model, options)
-    penetration = PenetrationWatch(model)
+    penetration, loads = PenetrationWatch(model), LoadWatch(model)
     if model._space_watch is None:
         model._space_watch = SpaceWatch(model)
 
@@ -139,6 +140,7 @@ def run_explicit(
         energy.look(now)
         failure.look(now)
         penetration.look()
+        loads.look()
         return now
 
     for until in times:

@@ -12,9 +12,10 @@ from . import _core
 from ._core import InputError, Integration, RunError
 from .checks import flag, positive, within
 from .energy import ADVICE, LEAST_STEPS, EnergyWatch
-from .failure_watch import FailureWatch
 from .explicit import is_report_due
+from .failure_watch import FailureWatch
 from .ghost import GhostPenalty
+from .load_watch import LoadWatch
 from .partition import keep_balance
 from .rayleigh import Rayleigh, implicit_mass_damping
 from .report import ImplicitReport
@@ -216,12 +217,14 @@ def run_implicit(
     advise = (lambda: f"{AVERAGED}; {advice}") if averages else (lambda: swollen(model) or advice)
     energy = EnergyWatch(energy_limit, model.comm.rank == 0, advise, least_steps)
     failure = FailureWatch(model, options)
+    loads = LoadWatch(model)
 
     def report() -> ImplicitReport:
         now = stepper.report()
         if not options.quasi_static:  # without inertia what a sudden load does beyond the stresses' work goes nowhere
             energy.look(now)
             failure.look(now)
+        loads.look()
         return now
 
     for until in times:
