@@ -99,7 +99,7 @@ class ConsolidationResults(SupportedBody, PointFunctions):
         return at_positions(acting, outside)
 
     def stored_water(self) -> float:
-        """Volume of water in the body [m3], [m2] in plane strain, at atmospheric pressure. Collective."""
+        """Volume of water in the body [m3], at atmospheric pressure; [m2] in plane strain, in axial symmetry per radian. Collective."""
         return self.domain.comm.allreduce(fem.assemble_scalar(self._terms.content))
 
     def inflow(self, facet_tag: int | str | None) -> float:
@@ -109,7 +109,8 @@ class ConsolidationResults(SupportedBody, PointFunctions):
             facet_tag: number or name of the tag; None for all boundary conditions together.
 
         Returns:
-            Inflow [m3/s], [m2/s] in plane strain; negative where water leaves.
+            Inflow [m3/s], per metre [m2/s] in plane strain and per radian in axial symmetry (that of the whole body is 2 pi times
+            as much); negative where water leaves.
 
         Raises:
             InputError: no facet has the tag. Raised on all ranks alike.
