@@ -12,10 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from fenics_bridge.errors import agree
 
-Value = float | Callable | tuple
+Value = float | Callable | tuple | NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -75,10 +76,8 @@ def value_at(value: Value, time: float) -> float:
     """A number, function or table of a boundary condition at a time [s]."""
     if callable(value):
         return float(value(time))
-    if isinstance(value, (tuple, list)):
-        times, values = np.transpose(np.asarray(value, dtype=float))
-        return float(np.interp(time, times, values))
-    return float(value)
+    numbers = np.asarray(value, dtype=float)
+    return float(np.interp(time, *numbers.T)) if numbers.ndim else float(numbers)
 
 
 def mean_over(value: Value, start: float, end: float) -> float:

@@ -59,3 +59,21 @@ def test_a_step_over_a_whole_event_takes_up_its_rain():
     for end, mean in ((5.0, 1e-6), (15.0, 3e-6), (100.0, 0.5 * 5.0 * 2e-6 / 85.0)):  # of the triangle, by hand
         assert flow.advance(end - flow.time)
         assert flow.inflow(4) == pytest.approx(mean, rel=1e-9)
+
+
+def test_a_table_may_be_a_numpy_array():
+    rows = ((0.0, 1.0), (10.0, 2.0))
+    results = []
+    for table in (rows, list(rows), np.array(rows)):
+        domain, _, tags = bridge.box_mesh(MPI.COMM_WORLD, (1.0, 1.0), (2, 2))
+        flow = water.Seepage(
+            domain,
+            water.PorousSoil(1e-4),
+            tags,
+            [water.Head(3, table), water.Flux(4, np.array(((0.0, 1e-7), (10.0, 2e-7))))],
+        )
+        flow.solve()
+        assert flow.advance(5.0)
+        assert flow.inflow(4) == pytest.approx(1.25e-7, rel=1e-9)  # from 1 to 1.5 in five seconds
+        results.append(flow.pressure_head.x.array.max())
+    assert results == pytest.approx([1.5] * 3, rel=1e-9)  # at the base, whose head is 1.5 m then
