@@ -23,6 +23,7 @@ from fenics_bridge.water.boundary import (
     SeepageFace,
     WaterBoundary,
     mean_over,
+    mistake_at,
     mistake_in,
     value_at,
 )
@@ -88,6 +89,16 @@ class AppliedBoundary:
             agree(self._space.mesh.comm, f"boundary: {condition!r}: {problem}" if problem else None)
         self.held = [self._where(condition) for condition in boundary]
         return True
+
+    def require_values(self, time: float) -> None:
+        """Require that functions of time return numbers that are possible at a time [s]. Collective.
+
+        Raises:
+            InputError: one does not. Raised on all ranks alike.
+        """
+        for held in self.held:
+            problem = mistake_at(held.condition, time)
+            agree(self._space.mesh.comm, f"boundary: {held.condition!r}: {problem}" if problem else None)
 
     def _where(self, condition: WaterBoundary) -> Any:
         """Part of the boundary on which a condition holds."""

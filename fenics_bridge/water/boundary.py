@@ -14,7 +14,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fenics_bridge.errors import agree
+from fenics_bridge.errors import agree, is_finite
 
 Value = float | Callable | tuple | NDArray[np.float64]
 
@@ -88,6 +88,20 @@ def mean_over(value: Value, start: float, end: float) -> float:
     corners = np.array([start, *times[(times > start) & (times < end)], end])
     there = np.interp(corners, times, values)
     return float(np.sum(0.5 * (there[1:] + there[:-1]) * np.diff(corners)) / (end - start))
+
+
+def mistake_at(condition: WaterBoundary, time: float) -> str | None:
+    """Error in the values that functions of a boundary condition return for a time [s]; None without an error."""
+    for name in ("level", "rate"):
+        value = getattr(condition, name, None)
+        if not callable(value):
+            continue
+        given = value(time)
+        if not is_finite(given):
+            return f"{name} is a function that returns {given!r} at t = {time:g} s, expected a finite number"
+        if isinstance(condition, Rain) and given < 0:
+            return f"rate is a function that returns {given!r} m/s at t = {time:g} s, expected 0 or more: rain does not leave the soil"
+    return None
 
 
 def listed(comm: MPI.Comm, boundary: Iterable[WaterBoundary]) -> list[WaterBoundary]:

@@ -293,6 +293,7 @@ class Consolidation(ConsolidationResults):
         agree(self.domain.comm, None if is_finite(dt) and dt > 0 else f"dt is {dt!r} s, expected a positive number")
         self._take_boundary()
         end, stored = self.time + dt, self.stored_water()
+        self._applied.require_values(end)
         load = self.load_at(end)
         external = self._external_at(end)
         self._applied.set_time(end, dt)

@@ -189,6 +189,10 @@ class Tabulated(_Curve):
                                  f"{s[k + 1]:g} Pa, expected values that fall")  # fmt: skip
             if values[0] != 1 or values[-1] < 0:
                 raise InputError(f"{name} goes from {values[0]:g} to {values[-1]:g}, expected from 1 to no less than 0")
+        if self.residual == 1:
+            raise InputError(
+                "saturation_values stay 1, expected values that fall; soil that stays saturated has AlwaysSaturated()"
+            )
 
     @property
     def residual(self) -> float:  # type: ignore[override]

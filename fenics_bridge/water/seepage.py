@@ -142,6 +142,7 @@ class Seepage:
             RuntimeError: no steady flow was found.
         """
         self._take_boundary()
+        self._applied.require_values(self.time)
         outlet = self._applied.lowest_outlet(self.time)
         self._set_load()
         if self._steady is None:
@@ -189,6 +190,7 @@ class Seepage:
         """
         agree(self.domain.comm, None if is_finite(dt) and dt > 0 else f"dt is {dt!r} s, expected a positive number")
         self._take_boundary()
+        self._applied.require_values(self.time + dt)
         if self._transient is None:
             self._transient = self._problem(transient=True)
         self._dt.value = dt

@@ -11,7 +11,7 @@ from dolfinx.mesh import Mesh
 from mpm_core.retention import curve_values
 from numpy.typing import ArrayLike, NDArray
 
-from fenics_bridge.errors import InputError, agree
+from fenics_bridge.errors import InputError, agree, is_finite
 from fenics_bridge.mesh.names import by_number, label
 from fenics_bridge.mesh.tagged import owned_cells, tag_values
 from fenics_bridge.types import MeshTags
@@ -44,19 +44,22 @@ class PorousSoil:
     """Density of the saturated soil [kg/m3]; for steps with inertia only"""
 
     def __post_init__(self) -> None:
-        k = np.asarray(self.conductivity, dtype=float)
+        try:
+            k = np.asarray(self.conductivity, dtype=float)
+        except (TypeError, ValueError):
+            k = np.full(1, np.nan)
         square = k.ndim == 2 and k.shape[0] == k.shape[1] and np.allclose(k, k.T)
         if not (
             np.all(np.isfinite(k)) and (k.ndim < 2 or square) and np.all(np.linalg.eigvalsh(self.tensor(k, 3)) > 0)
         ):
             raise InputError(f"conductivity is {self.conductivity!r} m/s, expected positive numbers, or a "
                              "symmetric tensor with positive principal values")  # fmt: skip
-        if not 0 < self.porosity < 1:
+        if not (is_finite(self.porosity) and 0 < self.porosity < 1):
             raise InputError(f"porosity is {self.porosity!r}, expected more than 0 and less than 1")
-        if not (np.isfinite(self.compressibility) and self.compressibility >= 0):
+        if not (is_finite(self.compressibility) and self.compressibility >= 0):
             raise InputError(f"compressibility is {self.compressibility!r} 1/Pa, expected 0 or more")
         curve_values(self.retention)
-        if self.density is not None and not (np.isfinite(self.density) and self.density > 0):
+        if self.density is not None and not (is_finite(self.density) and self.density > 0):
             raise InputError(f"density is {self.density!r} kg/m3, expected a positive number")
 
     @staticmethod
