@@ -1,16 +1,27 @@
-"""What FFCx and its C compiler write while forms are compiled: one line for the user, the rest to a logger."""
+"""What FFCx and its C compiler write while forms are compiled: one line for the user, the rest to a logger.
+
+And what a run that was killed meanwhile leaves in the cache: the file of a form without its library.
+"""
 
 from __future__ import annotations
 
 import logging
 import os
 import sys
+import time
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
+
+from ffcx.codegeneration import jit
+from mpm_core import RunError
 
 LOGGER = logging.getLogger("fenics_bridge.forms")
 """Gets the compiler's lines, at level DEBUG; add a handler to keep them"""
 FFCX = "ffcx"
 """Name of FFCx's own logger"""
+ABANDONED = 300.0
+"""Age [s] of the newest file of a form from which no process compiles it any more"""
 LOGGER.setLevel(logging.DEBUG)
 LOGGER.propagate = False
 LOGGER.addHandler(logging.NullHandler())
@@ -44,3 +55,27 @@ def redirect_compiler_lines() -> None:
         logging.captureWarnings(
             False
         )  # FFCx, when it is imported, turns the warnings of all modules into lines of its log
+
+
+_cached_module = jit.get_cached_module
+
+
+def _module_or_error(module_name: str, object_names: Any, cache_dir: Any, timeout: int) -> Any:
+    """FFCx's function of this name, for a form that another process compiles, or was killed compiling."""
+    source = Path(cache_dir) / f"{module_name}.c"
+    with suppress(FileNotFoundError):  # another run may remove it, too
+        ages = [time.time() - path.stat().st_mtime for path in Path(cache_dir).glob(f"{module_name}.*")]
+        if ages and min(ages) > ABANDONED and not source.with_suffix(".c.cached").exists():
+            source.unlink()
+    try:
+        return _cached_module(module_name, object_names, cache_dir, timeout)
+    except TimeoutError:
+        raise RunError(
+            f"a form of the finite elements is not compiled after {timeout} s: another run compiles it, or was ended while it did; if "
+            f"none is compiling, remove {source}"
+        ) from None
+
+
+def mend_cache() -> None:
+    """Compile forms anew whose compilation was broken off, and say which file is in the way where another run may compile them."""
+    jit.get_cached_module = _module_or_error
