@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 STANDARD_GRAVITY = 9.81
 """Gravity by which the unit weight of water is divided to get its density [m/s2]"""
 
-OTHER_GRAVITY = 1e-3
-"""Part by which gravity may differ from it where water stands up to a level"""
+OTHER_GRAVITY = 5e-3
+"""Part by which gravity may differ from it where water stands up to a level: on Earth it does by 0.003, and 9.8 and 9.82 are common"""
 
 
 def require_pores(porosity: NDArray, conductivity: NDArray) -> None:
