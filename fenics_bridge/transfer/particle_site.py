@@ -81,8 +81,8 @@ class ParticleSite:
             Report of the stage.
 
         Raises:
-            InputError: the stage has an unknown soil or boundary, or a law that the model was not made with. Raised on all ranks
-                alike.
+            InputError: the stage has an unknown soil or boundary, a law that the model was not made with, or a load on resting
+                cells; nothing has been changed. Raised on all ranks alike.
             StageError: there is no equilibrium; the particles are then in the last equilibrium of the stage.
         """
         model = self.model
@@ -91,6 +91,7 @@ class ParticleSite:
             **self._material,
             **{tag: self._number_of(state.law[tag], stage) for tag in stage_laws(stage, state)},
         }
+        self._refuse_resting(state, stage)
         if stage.reset_displacement:
             model.particles.set("initial_position", model.particles.position)
         model.remove(np.isin(model.mesh.cell_tags[model.particles.cell], excavate))
@@ -174,6 +175,23 @@ class ParticleSite:
         if state.pore_pressure is not None:
             force += seepage_forces(model, state.pore_pressure)
         model.particles.set("traction", force)
+
+    def _refuse_resting(self, state: SiteState, stage: Stage) -> None:
+        """Raise InputError, on all ranks, where pressures or pore water would load resting cells. Collective."""
+        model, rests = self.model, self.model.particles.is_resting
+        if not model._core.has_resting_cells:
+            return
+        pressed = np.isin(model.mesh._core.facet_tags[model.particles.cell[rests]], list(state.pressure))
+        loaded = {"pressure": pressed}
+        if state.pore_pressure is not None:
+            loaded["pore_pressure"] = seepage_forces(model, state.pore_pressure)[rests] != 0
+        for name, rows in loaded.items():
+            count = model.comm.allreduce(int(np.count_nonzero(rows.any(axis=1))))
+            message = (
+                f"stage {stage.name!r}: {name} would load {count} resting cells, expected particles to carry it: turn the cells "
+                "there into particles first, by Model.convert"
+            )
+            agree(model.comm, message if count else None)
 
     def _failure(self, stage: Stage, error: Any) -> Any:
         return (

@@ -129,3 +129,15 @@ def test_cells_turn_into_particles_under_a_body_on_all_ranks_as_on_one(comm, own
     force, reference = (model.contacts[0].force for model in models)
     assert abs(reference[1]) > 1
     np.testing.assert_allclose(force, reference, rtol=0, atol=1e-8 * np.abs(reference).max())
+
+
+def test_loads_on_resting_cells_are_refused_on_all_ranks(comm):
+    # The loaded cells are those of one rank at most; the others refuse too, instead of waiting for it.
+    model = steep_block(comm)
+    top = mpm.Box((0.0, 0.6), (0.1, 0.7))
+    with pytest.raises(mpm.InputError, match="surface Box.* would load .* resting cells"):
+        model.load_surface(top, pressure=1e3)
+    forces = np.zeros((len(model.particles), 2))
+    forces[model.particles.id == 0] = 1.0
+    with pytest.raises(mpm.InputError, match="traction would load 1 resting cells"):
+        model.particles.set("traction", forces)

@@ -97,7 +97,7 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
         self._first_mesh = mesh  # kept, since it may own the communicator
         self._left_imbalance = 1.0  # by the last partition
         self._integration: Any = None  # of stresses, where runs name none; kept until more particles are seeded
-        self.particles = Particles(self._core, self.geometry)
+        self.particles = Particles(self._core, self.geometry, self.comm)
         """The particles on this rank."""
 
     cuts = renamed("cuts", "repartitions")
@@ -243,7 +243,7 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
             Area of the loaded parts [m^(D-1)] over all ranks; per radian in axial symmetry.
 
         Raises:
-            InputError: an argument out of its range, a surface without soil beside it. On all ranks alike.
+            InputError: an argument out of its range, a surface without soil or with resting cells beside it. On all ranks alike.
 
         Example:
             >>> model.load_surface(mpm.Disc((0.0, -5.0), 1.0), pressure=50e3)  # in a tunnel

@@ -6,10 +6,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._core import Geometry, InputError
+from .collective import collectively
 from .mesh import floats
 from .views import particle_mesh, particle_table, particles_text, plot_particles
 
@@ -28,9 +30,10 @@ class Particles:
         >>> model.particles[low].stress.mean(axis=0)
     """
 
-    def __init__(self, core: Any, geometry: Geometry, rows: NDArray[np.int64] | None = None) -> None:
+    def __init__(self, core: Any, geometry: Geometry, comm: MPI.Comm, rows: NDArray[np.int64] | None = None) -> None:
         self._core = core
         self._geometry = geometry
+        self._comm = comm
         self._rows = rows
 
     def __repr__(self) -> str:
@@ -49,7 +52,7 @@ class Particles:
             InputError: rows of another shape or dtype, or a row that does not exist, also when the attribute is read later.
         """
         self._require_all("choosing rows")
-        return Particles(self._core, self._geometry, self._core.row_numbers(np.asarray(rows)))
+        return Particles(self._core, self._geometry, self._comm, self._core.row_numbers(np.asarray(rows)))
 
     def find(self, ids: Sequence[int] | NDArray[np.integer]) -> NDArray[np.int64]:
         """The row of each of some particles, by their numbers, shape (m,); -1 for those that are not on this rank."""
@@ -168,13 +171,15 @@ class Particles:
     def set(self, name: str, values: ArrayLike) -> None:
         """Overwrite a field that can be set according to `schedule`, such as velocity, stress, state or traction.
 
+        Not collective, except for tractions where cells rest.
+
         Args:
             name: the field.
             values: one row per particle, in the present order; shape as the attribute of that name gives it.
 
         Raises:
-            InputError: unknown field, wrong shape or dtype, a value that is not finite, only some particles, or a velocity of the
-                water before an explicit step has given it one of its own.
+            InputError: unknown field, wrong shape or dtype, a value that is not finite, only some particles, a velocity of the
+                water before an explicit step has given it one of its own, or, on all ranks, a traction on a resting cell.
         """
         self._require_all("set")
         if name == "water_velocity" and not self._core.has_two_phases:
@@ -183,7 +188,21 @@ class Particles:
                 "such as model.explicit(until=1e-9, dt=1e-9).last()"
             )
         shape: tuple[int | None, ...] = tuple(None for _ in np.shape(values))
-        self._core.set_column(name, floats(name, values, shape))
+        if name == "traction" and self._core.has_resting_cells:
+            self._set_tractions(collectively(self._comm, lambda: floats(name, values, shape)), name)
+        else:
+            self._core.set_column(name, floats(name, values, shape))
+
+    def _set_tractions(self, forces: NDArray[np.float64], what: str) -> None:
+        """Set the forces on particles; raises InputError, on all ranks, where resting cells would be given some. Collective."""
+        loaded = np.any(forces != 0, axis=1) if forces.ndim == 2 and len(forces) == len(self) else False
+        count = self._comm.allreduce(int(np.count_nonzero(loaded & self.is_resting)))
+        if count:
+            raise InputError(
+                f"{what} would load {count} resting cells, expected particles to carry it: turn the cells there into particles "
+                "first, by Model.convert"
+            )
+        self._core.set_column("traction", forces)
 
 
 def field_text(field: dict[str, Any], shape: str) -> str:

@@ -71,7 +71,7 @@ def load_surface(model: Body, surface: Surface, pressure: float | None, traction
     own = loaded & (first == model.comm.rank)
     forces = particles.traction.copy() if len(particles.traction) else np.zeros((len(size), dim))
     np.add.at(forces, numbers[found[own]], parts[own, None] * (normal_stress * normals[own] + vector))
-    particles.set("traction", forces)
+    particles._set_tractions(forces, f"surface {surface!r}")
     area = float(parts[loaded].sum())
     _, squares = nearest(points[~loaded], normals[~loaded], particles.position[near], NEARLY * size[near])
     is_near = np.array(model.comm.allgather(np.isfinite(squares))).any(axis=0)

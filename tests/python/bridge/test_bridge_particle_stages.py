@@ -125,3 +125,26 @@ def test_removed_particles_are_gone_and_the_others_stay(tmp_path):
     kept = dict(zip(p.id[~gone].tolist(), p.stress[~gone].tolist()))
     assert model.remove(gone) == MPI.COMM_WORLD.allreduce(int(gone.sum())) > 0
     assert dict(zip(model.particles.id.tolist(), model.particles.stress.tolist())) == kept
+
+
+@pytest.mark.parametrize("load", [{"pressure": {"right": 5e3}}, {"pore_pressure": bridge.hydrostatic(2.0)}])
+def test_loads_on_resting_cells_are_refused_until_they_are_particles(tmp_path, load):
+    """Resting cells carry no forces: a stage that would load some changes nothing, and is carried out once they are converted."""
+    soils, stresses = SOILS["pit"][:1], []
+    stage = bridge.Stage("load", **load, release="right")
+    for rests in (False, True):
+        site = particle_site(mesh_of("pit", tmp_path), elastic(soils), small_displacements=True, tolerance=1e-8)
+        site.carry_out(bridge.Stage("in situ", fill=soils, unit_weight=weights(soils)))
+        if rests:
+            site.model.rest()
+            before = site.model.particles.stress
+            with pytest.raises(
+                mpm.InputError, match=rf"'load': {next(iter(load))} would load [1-9]\d* resting cells.*convert"
+            ):
+                site.carry_out(stage)
+            assert np.array_equal(site.model.particles.stress, before) and site.number == 1
+            site.model.convert()
+        site.carry_out(stage)
+        p = site.model.particles
+        stresses.append(p.stress[np.lexsort(p.position.T)])
+    assert np.allclose(*stresses, rtol=0, atol=1e-6 * np.abs(stresses[0]).max())

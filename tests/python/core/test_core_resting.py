@@ -364,6 +364,14 @@ def test_cells_that_cannot_rest_are_refused(model, before, message):
         (moved, r"place\(\) does not support resting cells, of which the model has 8"),
         (lambda model: model.traction(1, (1.0, 0.0)), "facets of resting cells"),
         (
+            lambda model: model.particles.set("traction", np.eye(8, 2)),
+            "traction would load 2 resting cells, expected particles to carry it: .*by Model.convert",
+        ),
+        (
+            lambda model: model.load_surface(mpm.Box((0.0, 1.0), (1.0, 1.5)), pressure=1e4),
+            r"surface Box.* would load [1-9] resting cells, expected particles",
+        ),
+        (
             lambda model: list(model.explicit(1.0, integration=mpm.Integration.DUAL_DOMAIN)),
             "integration DUAL_DOMAIN does not support",
         ),
