@@ -24,12 +24,13 @@ class PointSearch:
     Args:
         domain: mesh of DOLFINx.
         points: positions of this rank's points [m], shape (n, D).
+        active: function that is 1 in the cells that points between cells prefer and 0 in the others; None for no preference.
 
     Raises:
         InputError: points has another shape or a value that is not finite. Raised on all ranks alike.
     """
 
-    def __init__(self, domain: Mesh, points: ArrayLike) -> None:
+    def __init__(self, domain: Mesh, points: ArrayLike, active: fem.Function | None = None) -> None:
         self._domain = domain  # it owns the communicator
         self._comm, dim = domain.comm, domain.geometry.dim
         points = np.ascontiguousarray(points, dtype=float)
@@ -40,14 +41,18 @@ class PointSearch:
         near = np.array([np.all((points >= low) & (points <= high), axis=1) for low, high in boxes])
         self._ranks, self._rows = np.nonzero(near)  # that may have a point, by rising rank
         asked, self._askers = exchange_rows(self._comm, self._ranks, points[self._rows])
-        cells = local_cells(domain, asked)
+        preferred = np.ones(owned_cells(domain)) if active is None else active.x.array[: owned_cells(domain)]
+        cells = local_cells(domain, asked, preferred)
         self._inside = cells >= 0
         self._cells = cells[self._inside]
         self._at = np.zeros((len(self._cells), 3))
         self._at[:, :dim] = asked[self._inside]
         self.found = np.zeros(len(points), dtype=bool)
-        # From the last rank down, so that the lowest one prevails where several have a point.
-        self._there = np.flatnonzero(self._returned(self._inside[:, None].astype(float)))[::-1]
+        ranking = np.where(self._inside, 1.0 + preferred[cells], 0.0) if len(preferred) else np.zeros(len(cells))
+        ranking = self._returned(ranking[:, None])[:, 0]
+        # The best come last and prevail where several ranks have a point; among equals the lowest rank does.
+        there = np.flatnonzero(ranking)[::-1]
+        self._there = there[np.argsort(ranking[there], kind="stable")]
         self.found[self._rows[self._there]] = True
 
     def require_all(self, argument: str = "points") -> None:
@@ -111,11 +116,14 @@ class PointSearch:
         return exchange_rows(self._comm, self._askers, values)[0]
 
 
-def evaluate_at(points: ArrayLike, **functions: fem.Function) -> dict[str, NDArray[np.float64]]:
+def evaluate_at(
+    points: ArrayLike, active: fem.Function | None = None, /, **functions: fem.Function
+) -> dict[str, NDArray[np.float64]]:
     """Values of several functions of one mesh at points; the points and their cells may be on different ranks. Collective.
 
     Args:
         points: positions of this rank's points [m], shape (n, D).
+        active: as for `PointSearch`.
         **functions: functions by the names that their values are to have.
 
     Returns:
@@ -125,15 +133,16 @@ def evaluate_at(points: ArrayLike, **functions: fem.Function) -> dict[str, NDArr
         InputError: a point is outside the mesh; the message names it. Raised on all ranks alike.
     """
     domain = next(iter(functions.values())).function_space.mesh
-    search = PointSearch(domain, points)
+    search = PointSearch(domain, points, active)
     search.require_all()
     return {name: search.values(function) for name, function in functions.items()}
 
 
-def local_cells(domain: Mesh, points: NDArray[np.float64]) -> NDArray[np.int32]:
+def local_cells(domain: Mesh, points: NDArray[np.float64], preferred: NDArray[np.float64]) -> NDArray[np.int32]:
     """Owned cell that contains each point, -1 if there is none on this rank: (n,).
 
-    A point on the border of several cells goes to the one in which it lies deepest.
+    A point on the border of several cells goes to a preferred one, by a number for each cell, and among these to the one in
+    which it lies deepest.
     """
     dim, n_cells = domain.geometry.dim, owned_cells(domain)
     found = np.full(len(points), -1, dtype=np.int32)
@@ -146,7 +155,7 @@ def local_cells(domain: Mesh, points: NDArray[np.float64]) -> NDArray[np.int32]:
     offsets, cells = compat.candidate_cells(domain, np.arange(n_cells), padded, _TOLERANCE * size)
     rows = np.repeat(np.arange(len(points)), np.diff(offsets))
     depth = _depth(corners[cells], points[rows])
-    order = np.lexsort((depth, rows))
+    order = np.lexsort((depth, preferred[cells], rows))
     order = order[depth[order] >= -_TOLERANCE]
     found[rows[order]] = cells[order]  # the deepest comes last and holds
     return found

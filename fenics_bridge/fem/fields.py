@@ -116,7 +116,7 @@ class SupportedBody:
         return space.mesh.comm.allreduce(carried[:own].sum(axis=0))
 
 
-def nodal_average(function: fem.Function, radius: Any = None) -> fem.Function:
+def nodal_average(function: fem.Function, radius: Any = None, active: fem.Function | None = None) -> fem.Function:
     """Average a function at the nodes, by the volume of the cells around each of them. Collective.
 
     (The lumped L2 projection; it smooths stresses that jump between cells.)
@@ -124,19 +124,21 @@ def nodal_average(function: fem.Function, radius: Any = None) -> fem.Function:
     Args:
         function: vector function on a mesh.
         radius: radius of an axisymmetric body, a UFL expression; None in others.
+        active: function of one component that is 1 in the cells that count and 0 in the others; None where all do.
 
     Returns:
-        Continuous, piecewise linear function.
+        Continuous, piecewise linear function; 0 at nodes of cells that do not count only.
     """
     domain = function.function_space.mesh
     size = function.ufl_shape[0]
     space = compat.function_space(domain, "Lagrange", 1, size)
     test = ufl.TestFunction(space)
     ones = fem.Constant(domain, np.ones(size))
-    sums = assembled(fem.form(weighted(ufl.inner(function, test), radius) * ufl.dx), space)
-    weights = assembled(fem.form(weighted(ufl.inner(ones, test), radius) * ufl.dx), space)
+    there = 1.0 if active is None else active[0]
+    sums = assembled(fem.form(weighted(there * ufl.inner(function, test), radius) * ufl.dx), space)
+    weights = assembled(fem.form(weighted(there * ufl.inner(ones, test), radius) * ufl.dx), space)
     average = fem.Function(space, name=function.name)
-    average.x.array[:] = sums.array / weights.array
+    np.divide(sums.array, weights.array, out=average.x.array, where=weights.array > 0)
     return average
 
 

@@ -319,7 +319,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         """The stress as a function. Collective.
 
         Args:
-            smooth: linear in each cell, through or near its points, or averaged at the nodes (degree 1).
+            smooth: linear in each cell, through or near its points, or averaged over the active cells at the nodes (degree 1).
 
         Returns:
             Stress [Pa], constant in each cell, the mean of its points, unless `smooth`.
@@ -327,12 +327,13 @@ class QuasiStatic(SupportedBody, PointFunctions):
         if smooth and self.degree > 1:
             return self.points.cell_function(self.points.stress, "stress", 1)
         mean = self.points.cell_function(self.points.stress, "stress", 0)
-        return nodal_average(mean, self.radius) if smooth else mean
+        return nodal_average(mean, self.radius, self.active_function()) if smooth else mean
 
     def evaluate_at(self, points: ArrayLike, smooth: bool = False) -> dict[str, NDArray[np.float64]]:
         """Values at points; the points and their cells may be on different ranks. Collective.
 
-        The cells' mean stress is admissible; the smooth one may exceed the strength.
+        The cells' mean stress is admissible; the smooth one may exceed the strength. On the border of soil that has been removed
+        the values are those of the soil that is there.
 
         Args:
             points: positions [m], shape (n, D).
@@ -344,6 +345,5 @@ class QuasiStatic(SupportedBody, PointFunctions):
         Raises:
             InputError: a point is outside the body; the message names it. Raised on all ranks alike.
         """
-        return evaluate_at(
-            points, displacement=self.displacement, stress=self.stress_function(smooth), state=self.state_function()
-        )
+        values = {"stress": self.stress_function(smooth), "state": self.state_function()}
+        return evaluate_at(points, self.active_function(), displacement=self.displacement, **values)

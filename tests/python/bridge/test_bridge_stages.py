@@ -295,3 +295,18 @@ def test_soil_under_tension_is_said_so(column):
     site = site_of(column, laws, [*ROLLERS[:2], bridge.roller("surface", (0, 1))])
     with pytest.raises(bridge.StageError, match="'ground' near .* the law MohrCoulomb"):
         carried_out(site, bridge.Stage("hanging", fill="ground", unit_weight={"ground": 20e3}))
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_smooth_stresses_and_points_on_the_border_are_those_of_the_soil_that_is_there(pit, degree):
+    """A removed cell has no stress; neither averages nor points on its border take it. The walls and floor of the pit."""
+    laws = elastic(SOILS["pit"])
+    site = site_of(pit, laws, degree=degree)
+    carried_out(site, IN_SITU, *DIG)
+    direct = at_once(pit, ["ground"], laws, bridge.Load(20e3, pressure={"floor": 5e3}), degree=degree)
+    border = np.array([(3.0, y) for y in (3.3, 4.6, 5.5)] + [(x, 3.0) for x in (0.4, 1.7, 2.9)])
+    depth = np.array([2.7, 1.4, 0.5, 3.0, 3.0, 3.0])
+    for smooth in (False, True):
+        got, expected = (fem.evaluate_at(border, smooth=smooth)["stress"] for fem in (site.fem, direct))
+        assert np.allclose(got, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+        assert (got[:3, 1] < -0.2 * 20e3 * depth[:3]).all() and (got[3:, 0] != 0).all()
