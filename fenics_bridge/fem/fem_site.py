@@ -27,7 +27,8 @@ class FemSite:
         progress: function that is called with each load step, e.g. `print_step`.
 
     Raises:
-        InputError: fem has no cell tags, or is loaded already. Raised on all ranks alike.
+        InputError: fem has no cell tags, is loaded already, or has a support that prescribes a displacement, which belongs in a
+            stage. Raised on all ranks alike.
     """
 
     def __init__(
@@ -44,6 +45,11 @@ class FemSite:
         )
         fresh = fem.load == Load() and not fem.off
         agree(comm, None if fresh else "fem is loaded already, expected a new one, whose soils the stages place")
+        moved = next((support for support in fem.supports if any(support.displacement or ())), None)
+        problem = (
+            f"supports: {moved} prescribes a displacement, expected it in a stage, which applies it: Stage(support=...)"
+        )
+        agree(comm, problem if moved else None)
         self.fem = fem
         """The finite elements"""
         self.number = 0

@@ -297,6 +297,21 @@ def test_soil_under_tension_is_said_so(column):
         carried_out(site, bridge.Stage("hanging", fill="ground", unit_weight={"ground": 20e3}))
 
 
+def test_a_prescribed_displacement_is_applied_by_a_stage_and_refused_before(column):
+    """The top of the column is pushed down by u: strain u / H, and in layers of one stiffness the stress M u / H."""
+    push = -0.012
+    laws = {soil: mpm.LinearElastic(young=20e6, poisson=POISSON) for soil in SOILS["column"]}
+    pushed = bridge.prescribed("surface", (None, push))
+    with pytest.raises(
+        mpm.InputError, match=r"supports: .*'surface'.* prescribes a displacement, expected it in a stage"
+    ):
+        site_of(column, laws, [*ROLLERS, pushed])
+    site = site_of(column, laws)
+    carried_out(site, bridge.Stage("push", fill="ground", unit_weight={"ground": 0.0}, support=pushed))
+    stress, _ = there_of(site.fem.points)
+    assert stress[:, 1] == pytest.approx(oedometer("ground") * push / 3, rel=1e-9)
+
+
 @pytest.mark.parametrize("degree", [1, 2])
 def test_smooth_stresses_and_points_on_the_border_are_those_of_the_soil_that_is_there(pit, degree):
     """A removed cell has no stress; neither averages nor points on its border take it. The walls and floor of the pit."""
