@@ -44,7 +44,7 @@ class Stage:
     support: Any = ()
     """Supports (`fixed`, `roller`, `prescribed`), one or several, that begin to hold, from where the nodes are now"""
     release: Any = ()
-    """Boundaries, one or several, whose supports are removed"""
+    """Boundaries, one or several, whose supports are removed; a support of several boundaries stays at the others"""
     pore_pressure: OfPosition | None = None
     """Function of positions (n, D) [m] that returns pore pressures (n,) [Pa], e.g. `hydrostatic(2.0)`; None leaves them as they
     are. Stresses of laws are effective then, unit weights are those of the saturated soil, and water also presses on the surface
@@ -222,9 +222,14 @@ class SiteState:
         gone = {n for tag in stage.release for n in self._facets_of(tag, where + "release")}
         wrong = gone - held
         agree(self._comm, f"{where}release: {stage.release!r} names a boundary without support" if wrong else None)
-        # What was prescribed in an earlier stage has happened, and is held now.
-        kept = [replace(s, displacement=s.displacement and tuple(v and 0.0 for v in s.displacement))
-                for s in self.supports if not gone.issuperset(self._facets_of(s.facet_tag, where + "support"))]  # fmt: skip
+        kept: list[Support] = []
+        for support in self.supports:
+            numbers = self._facets_of(support.facet_tag, where + "support")
+            left = [number for number in numbers if number not in gone]
+            tags = [support.facet_tag] if len(left) == len(numbers) else left
+            # What was prescribed in an earlier stage has happened, and is held now.
+            held_now = support.displacement and tuple(v and 0.0 for v in support.displacement)
+            kept += [replace(support, facet_tag=tag, displacement=held_now) for tag in tags]
         for support in stage.support:
             self._facets_of(support.facet_tag, where + "support")
         return (*kept, *stage.support)

@@ -127,6 +127,20 @@ def test_removed_particles_are_gone_and_the_others_stay(tmp_path):
     assert dict(zip(model.particles.id.tolist(), model.particles.stress.tolist())) == kept
 
 
+def test_one_of_several_sides_of_a_support_is_released(tmp_path):
+    """Particles at "sides" of which one goes are held as by a support at the other alone."""
+    domain, cell_tags, facet_tags = mesh_of("pit", tmp_path)
+    names = bridge.names_of(facet_tags)
+    bridge.name_tags(facet_tags, {**names, "sides": names["left"] + names["right"]})
+    soils, stresses = SOILS["pit"], []
+    for supports in (ROLLERS, [bridge.roller("sides", (1, 0)), bridge.fixed("base")]):
+        options = {"supports": supports, "small_displacements": True, "tolerance": 1e-8}
+        site = particle_site((domain, cell_tags, facet_tags), elastic(soils), **options)
+        list(bridge.carry_out(site, [IN_SITU, bridge.Stage("free", release="right")]))
+        stresses.append(site.model.particles.stress)
+    assert np.allclose(*stresses, rtol=0, atol=1e-7 * np.abs(stresses[0]).max())
+
+
 @pytest.mark.parametrize("load", [{"pressure": {"right": 5e3}}, {"pore_pressure": bridge.hydrostatic(2.0)}])
 def test_loads_on_resting_cells_are_refused_until_they_are_particles(tmp_path, load):
     """Resting cells carry no forces: a stage that would load some changes nothing, and is carried out once they are converted."""

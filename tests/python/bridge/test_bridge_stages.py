@@ -76,6 +76,19 @@ def test_a_support_taken_away_leaves_the_body_without_it(pit):
     assert_same(site.fem, at_once(pit, SOILS["pit"], laws, load, [ROLLERS[0], ROLLERS[2]]))
 
 
+def test_one_of_several_sides_of_a_support_is_released(pit):
+    """Rollers at "sides" of which one goes are the roller at the other; 1e-9, as if there had been two supports."""
+    domain, cell_tags, facet_tags = pit
+    names = bridge.names_of(facet_tags)
+    bridge.name_tags(facet_tags, {**names, "sides": names["left"] + names["right"]})
+    laws = elastic(SOILS["pit"])
+    site = site_of(pit, laws, [bridge.roller("sides", (1, 0)), ROLLERS[2]])
+    carried_out(site, IN_SITU, bridge.Stage("free", release="right"))
+    direct = at_once(pit, SOILS["pit"], laws, bridge.Load(weights(SOILS["pit"])), [ROLLERS[0], ROLLERS[2]])
+    assert_same(site.fem, direct)
+    assert np.abs(site.fem.reaction("right")[0]) < 1e-9 * np.abs(site.fem.reaction("base")[1])
+
+
 def test_a_support_that_comes_holds_the_nodes_where_they_are(column):
     """A plate on the surface of the ground, then load above it: nothing below the plate notices."""
     soils = SOILS["column"]
