@@ -22,8 +22,8 @@ from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.fields import assembled
 from fenics_bridge.fem.geometry import weighted
-from fenics_bridge.fem.loads import LoadVectors
-from fenics_bridge.fem.supports import Constraints
+from fenics_bridge.fem.loads import LoadVectors, pressing
+from fenics_bridge.fem.supports import Constraints, held_components
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.mesh.tagged import owned_cells, tag_values
 
@@ -53,6 +53,7 @@ def reconfigure(model: Any, off: Any, supports: Any, pore_pressure: Any, stress:
     model._loads = LoadVectors(
         space, model.facet_tags, model.cell_tags, active=there if off else None, radius=model.radius
     )
+    model._water = water
     if water is not None:
         model._loads.constant = _seepage_forces(space, water, there, model.radius)
     old = replace(model._loads.resolved(model.load), displacement=0.0, held=0.0)
@@ -140,6 +141,21 @@ def _seepage_forces(space: Any, p: Any, there: Any, radius: Any) -> Any:
     form += weighted(there * suction * ufl.inner(normal, test), radius) * ufl.ds
     form += weighted(suction("+") * ufl.inner(outward, test("+")), radius) * ufl.dS
     return assembled(fem.form(form), space).array.copy()
+
+
+def water_on_supports(model: Any, facet_tag: int | str) -> NDArray[np.float64]:
+    """Force (D,) of the pore water on the supports at the facets of a tag, in the components that they hold. Collective."""
+    domain, space, p = model.domain, model.displacement.function_space, model._water
+    dim, own, force = domain.geometry.dim, space.dofmap.index_map.size_local, np.zeros(domain.geometry.dim)
+    if p is None:
+        return force
+    held = held_components(domain, model.facet_tags, model.supports)
+    pressure, test = weighted(p - ufl.min_value(p, 0.0), model.radius), ufl.TestFunction(space)
+    for number in tag_numbers(domain.comm, model.facet_tags, facet_tag, "facet_tag"):
+        if number in held:
+            form = pressing(domain, pressure, test, model.facet_tags, number, model._loads.active)
+            force -= held[number] * assembled(fem.form(form), space).array.reshape(-1, dim)[:own].sum(axis=0)
+    return domain.comm.allreduce(force)
 
 
 def free_motions(model: Any) -> list[str]:

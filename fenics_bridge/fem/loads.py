@@ -160,7 +160,8 @@ class LoadVectors:
         active: fem.Function | None = None,
         radius: Any = None,
     ) -> None:
-        self._active: Any = active
+        self.active: Any = active
+        """Function that is 1 in cells that are there and 0 in others; None where all are"""
         self._radius = radius
         self.constant: Any = 0.0
         """Forces that always act, an array like `forces`, or 0"""
@@ -234,7 +235,7 @@ class LoadVectors:
     def _unit_weight(self, dx: Any) -> Any:
         domain, dim = self._space.mesh, self._space.mesh.geometry.dim
         down = fem.Constant(domain, np.array([0.0] * (dim - 1) + [-1.0]))
-        there = 1.0 if self._active is None else self._active
+        there = 1.0 if self.active is None else self.active
         return assembled(
             fem.form(weighted(there * ufl.inner(down, self._test), self._radius) * dx), self._space
         ).array.copy()
@@ -249,7 +250,7 @@ class LoadVectors:
         if tag not in self._pressure:
             domain = self._space.mesh
             unit = weighted(fem.Constant(domain, 1.0), self._radius)
-            form = pressing(domain, unit, self._test, self._facet_tags, tag, self._active)
+            form = pressing(domain, unit, self._test, self._facet_tags, tag, self.active)
             self._pressure[tag] = assembled(fem.form(form), self._space).array.copy()
         return self._pressure[tag]
 
@@ -258,7 +259,7 @@ class LoadVectors:
         if tag not in self._traction:
             domain = self._space.mesh
             ds = ufl.Measure("ds", domain=domain, subdomain_data=self._facet_tags)
-            there = 1.0 if self._active is None else self._active
+            there = 1.0 if self.active is None else self.active
             self._traction[tag] = [
                 assembled(
                     fem.form(

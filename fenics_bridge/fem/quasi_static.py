@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
-from fenics_bridge.fem.active_cells import reconfigure
+from fenics_bridge.fem.active_cells import reconfigure, water_on_supports
 from fenics_bridge.fem.averaged import AveragedKinematics
 from fenics_bridge.fem.equilibration import EquilibriumReport, find_equilibrium
 from fenics_bridge.fem.equilibrium import Body
@@ -115,6 +115,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         self.supports: tuple[Support, ...] = tuple(supports)
         """The boundary conditions in force"""
         self._loads = LoadVectors(space, facet_tags, cell_tags, radius=self.radius)
+        self._water: fem.Function | None = None  # pore pressure, linear in each cell
         self._materials = Materials(domain, law, cell_tags)
         quadrature = max(1, 2 * (degree - 1))
         axisymmetric = self.radius is not None
@@ -314,6 +315,10 @@ class QuasiStatic(SupportedBody, PointFunctions):
     def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags, Sequence[Support]]:
         out_of_balance = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
         return self.displacement.function_space, out_of_balance, self.facet_tags, self.supports
+
+    def reaction(self, facet_tag: int | str) -> NDArray[np.float64]:
+        """As of `SupportedBody`: of the soil, and of its pore water on the facets in the components that are held. Collective."""
+        return super().reaction(facet_tag) + water_on_supports(self, facet_tag)
 
     def stress_function(self, smooth: bool = False) -> fem.Function:
         """The stress as a function. Collective.

@@ -149,12 +149,7 @@ def carried_fractions(
     asked = tag_numbers(comm, facet_tags, facet_tag, "facet_tag")
     areas = fem.Function(space), fem.Function(space)
     carried, whole = (function.x.array.reshape(-1, dim) for function in areas)
-    holds: dict[int, NDArray[np.bool_]] = {}
-    for support in supports:
-        components = [value is not None for value in support.displacement or (0.0,) * dim]
-        for number in tag_numbers(comm, facet_tags, support.facet_tag, "supports"):
-            holds[number] = holds.get(number, False) | np.array(components)
-    for number, held in holds.items():
+    for number, held in held_components(space.mesh, facet_tags, supports).items():
         for nodes, area in _areas_of_nodes(space, facet_tags.indices[facet_tags.values == number]):
             whole[nodes] += held * area
             if number in asked:
@@ -162,6 +157,16 @@ def carried_fractions(
     for function in areas:
         compat.add_shared(function.x)
     return carried / np.where(whole > 0, whole, 1.0)
+
+
+def held_components(domain: Mesh, facet_tags: MeshTags, supports: Sequence[Support]) -> dict[int, NDArray[np.bool_]]:
+    """Which components of the displacement (D,) supports hold, by the number of each tag that has any. Collective."""
+    holds: dict[int, NDArray[np.bool_]] = {}
+    for support in supports:
+        components = [value is not None for value in support.displacement or (0.0,) * domain.geometry.dim]
+        for number in tag_numbers(domain.comm, facet_tags, support.facet_tag, "supports"):
+            holds[number] = holds.get(number, False) | np.array(components)
+    return holds
 
 
 def _areas_of_nodes(space: Any, facets: NDArray[np.int32]) -> Iterator[tuple[NDArray[np.int32], NDArray[np.float64]]]:

@@ -310,6 +310,32 @@ def test_soil_under_tension_is_said_so(column):
         carried_out(site, bridge.Stage("hanging", fill="ground", unit_weight={"ground": 20e3}))
 
 
+@pytest.mark.parametrize("geometry", [None, bridge.Geometry.AXISYMMETRIC])
+@pytest.mark.parametrize("level", [2.0, 3.0, 4.5])
+def test_reactions_are_those_of_soil_and_water(column, level, geometry):
+    """By hand, of the saturated ground with free water above it; excavated soil leaves a surface on which water stands.
+
+    The base carries all weight, soil's and standing water's. A side carries the effective stress nu / (1 - nu) sigma'_v of the
+    soil and the pressure of the water.
+    """
+    soils, water = SOILS["column"], 9.81e3
+    site = site_of(column, elastic(soils), [*ROLLERS[:2], bridge.roller("base", (0, 1))], geometry=geometry)
+    filled = bridge.Stage(
+        "all", fill=soils, unit_weight={soil: 20e3 for soil in soils}, pore_pressure=bridge.hydrostatic(level)
+    )
+    carried_out(site, filled, bridge.Stage("dig", excavate=soils[1:]))
+    standing = water * max(level - 3.0, 0.0)
+    area = 1.0 if geometry is None else 0.5  # of the base, 1 m wide; of one radian
+    assert site.fem.reaction("base")[1] == pytest.approx(-(20e3 * 3 + standing) * area, rel=1e-9)
+    total_vertical = 20e3 * 3**2 / 2 + standing * 3  # integrals over the height of the side
+    pressed = water * (min(level, 3.0) * level - min(level, 3.0) ** 2 / 2)
+    ratio = POISSON / (1 - POISSON)
+    # Pressures that are linear in cells of h = 0.5 m miss those of a level within cells by up to gamma_w h / 4 there.
+    error = 1e-4 if level >= 3 else water * 0.5**2 / 4
+    assert site.fem.reaction("right")[0] == pytest.approx(ratio * (total_vertical - pressed) + pressed, abs=error)
+    assert np.abs(site.fem.reaction("surface")).max() == 0  # nothing holds it
+
+
 def test_a_prescribed_displacement_is_applied_by_a_stage_and_refused_before(column):
     """The top of the column is pushed down by u: strain u / H, and in layers of one stiffness the stress M u / H."""
     push = -0.012
