@@ -50,6 +50,10 @@ def reduced_strength(law: Laws, factor: float, unreduced: Collection[int | str] 
         if len(kept) == len(law):
             raise InputError(f"unreduced is {list(unreduced)}; no law is left whose strength could be reduced")
         return {tag: one if tag in kept else reduced_strength(one, factor) for tag, one in law.items()}
+    if len(unreduced):
+        raise InputError(
+            f"unreduced is {list(unreduced)} with one law for the whole body, expected laws by cell tag, of which some stay"
+        )
     return _core.reduced_strength(law, factor)
 
 

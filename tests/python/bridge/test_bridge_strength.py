@@ -93,6 +93,9 @@ def test_some_soils_stay_as_they_are():
         bridge.reduced_strength(laws, 2.0, unreduced=[1, 2])
     with pytest.raises(bridge.InputError, match=r"unreduced.*7.*\[1, 2, 3\]"):
         bridge.reduced_strength(laws, 2.0, unreduced=[7])
+    for reduce in (bridge.reduced_strength, bridge.davis_reduced_strength):
+        with pytest.raises(bridge.InputError, match=r"unreduced is \[1\] with one law .* expected laws by cell tag"):
+            reduce(laws[1], 2.0, [1])
 
 
 class Frictional:
