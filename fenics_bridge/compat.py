@@ -86,6 +86,13 @@ def tags_from_nodes(domain: mesh.Mesh, dim: int, entities: NDArray[np.int64], va
     return mesh.meshtags(domain, dim, tags.indices, tags.values)  # an object of Python, to which names can be given
 
 
+def are_tags_of(tags: Any, domain: mesh.Mesh) -> bool:
+    """Whether tags are those of entities of this mesh, not of another one."""
+    topologies = (tags.mesh.topology if hasattr(tags, "mesh") else tags.topology), domain.topology
+    one, other = (getattr(topology, "_cpp_object", topology) for topology in topologies)
+    return one is other
+
+
 def cell_nodes(domain: mesh.Mesh) -> NDArray[np.int32]:
     """Geometry nodes of each cell on this rank, ghosts last: (m, D + 1)."""
     nodes = domain.geometry.dofmap

@@ -7,7 +7,7 @@ from dolfinx.mesh import Mesh
 
 from fenics_bridge.errors import agree
 from fenics_bridge.mesh.names import by_number, described, label
-from fenics_bridge.mesh.tagged import owned_cells, tag_values
+from fenics_bridge.mesh.tagged import owned_cells, require_tags_of, tag_values
 from fenics_bridge.types import Law, Laws, MeshTags
 from mpm_core import law_types
 
@@ -24,10 +24,12 @@ class Materials:
         cell_tags: tags of the cells; None where there is one law.
 
     Raises:
-        InputError: a tag has no law, or a law is given for an unknown tag. Raised on all ranks alike.
+        InputError: a tag has no law, a law is given for an unknown tag, or the tags are those of another mesh. Raised on all
+            ranks alike.
     """
 
     def __init__(self, domain: Mesh, law: Laws, cell_tags: MeshTags | None) -> None:
+        require_tags_of(domain, cell_tags, domain.topology.dim)
         self._comm, self._cell_tags, n_cells = domain.comm, cell_tags, owned_cells(domain)
         self.tags: tuple = (None,)
         """Tags of the laws, in their order; (None,) for a law of the whole body"""

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from fenics_bridge import compat
 from fenics_bridge.errors import InputError, agree
 from fenics_bridge.mesh.names import tag_numbers
+from fenics_bridge.mesh.tagged import require_tags_of
 from fenics_bridge.types import MeshTags
 from mpm_core.mesh import Tag
 
@@ -83,7 +84,8 @@ class Constraints:
         held: further dofs (local, blocked) that stay.
 
     Raises:
-        InputError: an unknown tag, or displacements of another shape or not finite. Raised on all ranks alike.
+        InputError: an unknown tag, tags of another mesh, or displacements of another shape or not finite. Raised on all ranks
+            alike.
     """
 
     def __init__(
@@ -94,6 +96,7 @@ class Constraints:
         held: Sequence[int] | NDArray[np.int32] = (),
     ) -> None:
         domain, dim = space.mesh, space.mesh.geometry.dim
+        require_tags_of(domain, facet_tags, domain.topology.dim - 1)
         agree(domain.comm, _first_mistake(domain, facet_tags, supports, dim))
         domain.topology.create_connectivity(dim - 1, dim)
         value_of = {}

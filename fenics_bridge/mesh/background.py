@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import mpm_core as mpm
 from fenics_bridge import compat
 from fenics_bridge.mesh.names import names_of
-from fenics_bridge.mesh.tagged import owned_cells, tag_values
+from fenics_bridge.mesh.tagged import owned_cells, require_tags_of, tag_values
 from fenics_bridge.types import MeshTags
 
 
@@ -32,8 +32,12 @@ def background_arrays(
         The arguments of `mpm_core.Mesh` by name: points, shape (n, D) [m]; cells, shape (m, D + 1), int32 local nodes; cell_tags,
         shape (m,), int32, 0 where untagged; facets, shape (k, D), int32 local nodes of the tagged facets; facet_tags, shape (k,),
         int32; global_nodes, shape (n,), int64; global_cells, shape (m,), int64; cell_owners, shape (m,), int32 ranks.
+
+    Raises:
+        InputError: tags of other entities, or of another mesh. Raised on all ranks alike.
     """
     dim = domain.topology.dim
+    require_tags_of(domain, facet_tags, dim - 1)
     nodes = domain.geometry.index_map()
     n_nodes = nodes.size_local + nodes.num_ghosts
     cells = domain.topology.index_map(dim)
@@ -62,6 +66,9 @@ def background_mesh(domain: Mesh, cell_tags: MeshTags | None = None, facet_tags:
 
     Returns:
         The mesh; its attribute `domain` is the mesh of DOLFINx.
+
+    Raises:
+        InputError: tags of other entities, or of another mesh. Raised on all ranks alike.
     """
     arrays = background_arrays(domain, cell_tags, facet_tags)
     mesh = mpm.Mesh(**arrays, cell_names=names_of(cell_tags), facet_names=names_of(facet_tags), comm=domain.comm)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.mesh.names import name_tags, names_of, tag_numbers
-from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, owned_cells, tag_values
+from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, owned_cells, require_tags_of, tag_values
 from fenics_bridge.types import MeshTags
 from mpm_core.mesh import Tag
 
@@ -35,9 +35,11 @@ def soil_mesh(
         mesh, with their names.
 
     Raises:
-        InputError: no cell has a tag. Raised on all ranks alike.
+        InputError: no cell has a tag, or tags of other entities or of another mesh. Raised on all ranks alike.
     """
     dim = domain.topology.dim
+    require_tags_of(domain, cell_tags, dim)
+    require_tags_of(domain, facet_tags, dim - 1)
     numbers = tag_numbers(domain.comm, cell_tags, tag, "tag", "cell")
     values = tag_values(domain, cell_tags, dim)[: owned_cells(domain)]
     cells = np.flatnonzero(np.isin(values, numbers))

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenics_bridge import compat
+from fenics_bridge.errors import InputError
 from fenics_bridge.mesh.names import name_tags
 from fenics_bridge.types import MeshTags
 
@@ -75,8 +76,32 @@ def cell_volumes(domain: Mesh) -> NDArray[np.float64]:
     return np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / math.factorial(domain.geometry.dim)
 
 
+def require_tags_of(domain: Mesh, tags: MeshTags | None, dim: int) -> None:
+    """Require that tags, where there are any, are those of the cells, or of the facets, of a mesh.
+
+    Args:
+        domain: mesh of DOLFINx.
+        tags: tags of its entities of dimension `dim`, or None.
+        dim: dimension of the mesh for cells, one less for facets.
+
+    Raises:
+        InputError: they are tags of other entities, or of another mesh. Raised on all ranks alike.
+    """
+    if tags is None:
+        return
+    kind = "cell" if dim == domain.topology.dim else "facet"
+    if getattr(tags, "dim", None) != dim:
+        given = f"tags of entities of dimension {tags.dim}" if hasattr(tags, "dim") else repr(tags)
+        raise InputError(f"{kind}_tags is {given}, expected tags of {kind}s, of dimension {dim}")
+    if not compat.are_tags_of(tags, domain):
+        raise InputError(
+            f"{kind}_tags is of another mesh, expected tags of the {kind}s of this one, as `soil_mesh` returns them"
+        )
+
+
 def tag_values(domain: Mesh, tags: MeshTags | None, dim: int) -> NDArray[np.int32]:
-    """Tag of every entity of dimension `dim` on this rank, ghosts too, 0 where untagged."""
+    """Tag of every entity of dimension `dim` on this rank, ghosts too, 0 where untagged; see `require_tags_of`."""
+    require_tags_of(domain, tags, dim)
     index_map = domain.topology.index_map(dim)
     values = np.zeros(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
     if tags is not None:

@@ -7,6 +7,7 @@ from bridge_cases import MESHES
 from mpi4py import MPI
 
 import fenics_bridge as bridge
+import mpm_core as mpm
 from fenics_bridge.mesh.gmsh_reader import gmsh_session
 from fenics_bridge.mesh.tagged import owned_cells, tag_values
 
@@ -225,3 +226,31 @@ def test_soil_of_a_tag_that_does_not_exist_is_refused():
     domain, cell_tags, facet_tags = bridge.slope_mesh(COMM)
     with pytest.raises(bridge.InputError, match="tag: no cell has the tag 7"):
         bridge.soil_mesh(domain, cell_tags, facet_tags, tag=7)
+
+
+ELASTIC = mpm.LinearElastic(young=1e6, poisson=0.3)
+HELD = [bridge.fixed(bridge.BASE)]
+SWAPPED = "facet_tags is tags of entities of dimension 2, expected tags of facets, of dimension 1"
+
+
+@pytest.mark.parametrize(
+    ("use", "message"),
+    [
+        (lambda d, c, f, body: bridge.QuasiStatic(body[0], ELASTIC, f, HELD), "facet_tags is of another mesh"),
+        (lambda d, c, f, body: bridge.QuasiStatic(body[0], ELASTIC, body[2], HELD, cell_tags=c), "cell_tags is of another"),
+        (lambda d, c, f, body: bridge.QuasiStatic(d, ELASTIC, c, [bridge.fixed(bridge.SOIL)]), SWAPPED),
+        (lambda d, c, f, body: bridge.QuasiStatic(d, {3: ELASTIC}, f, HELD, cell_tags=f), "cell_tags is .* of dimension 1"),
+        (lambda d, c, f, body: bridge.QuasiStatic(d, ELASTIC, "base", HELD), "facet_tags is 'base', expected tags"),
+        (lambda d, c, f, body: bridge.MixedQuasiStatic(body[0], ELASTIC, f, HELD), "facet_tags is of another mesh"),
+        (lambda d, c, f, body: bridge.background_mesh(d, f, c), SWAPPED),
+        (lambda d, c, f, body: bridge.background_mesh(d, body[1], f), "cell_tags is of another mesh"),
+        (lambda d, c, f, body: bridge.background_mesh(d, c, body[2]), "facet_tags is of another mesh"),
+        (lambda d, c, f, body: bridge.soil_mesh(d, body[1], f), "cell_tags is of another mesh"),
+        (lambda d, c, f, body: bridge.soil_mesh(d, c, body[2]), "facet_tags is of another mesh"),
+    ],
+)  # fmt: skip
+def test_tags_of_another_mesh_or_of_other_entities_are_refused(use, message):
+    domain, cell_tags, facet_tags = bridge.slope_mesh(COMM, height=1.0, cell_size=0.5, kind="fitted")
+    body = bridge.soil_mesh(domain, cell_tags, facet_tags)
+    with pytest.raises(bridge.InputError, match=message):
+        use(domain, cell_tags, facet_tags, body)
