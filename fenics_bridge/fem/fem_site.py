@@ -21,7 +21,8 @@ class FemSite:
     """A body of finite elements that is built and excavated in stages, see `Stage` and `carry_out`. Collective.
 
     Args:
-        fem: finite elements, new and unloaded, of the soils of all stages, with a law for each; at first none is placed.
+        fem: finite elements, new and unloaded, of the soils of all stages, with a law for each or one for all, which is then the
+            law of each; at first none is placed.
         first_step: first fraction of each stage's change [-], as for `QuasiStatic.solve`.
         tolerance: fraction of a stage's change below which steps end [-].
         progress: function that is called with each load step, e.g. `print_step`.
@@ -63,6 +64,7 @@ class FemSite:
             supports=fem.supports,
         )
         """Which soils have been placed, their weights, loads and supports"""
+        fem.give_laws_by_tag()
         switch_off(fem)
         self._every = set(known_tags(comm, fem.cell_tags))
 

@@ -195,6 +195,16 @@ class QuasiStatic(SupportedBody, PointFunctions):
             laws = laws * len(tags)
         return dict(zip(tags, laws))
 
+    def give_laws_by_tag(self) -> None:
+        """Make one law for the whole body the law of each cell tag, so that a stage may change that of one soil. Collective.
+
+        Raises:
+            InputError: cells without a tag. Raised on all ranks alike.
+        """
+        if self.soils == (None,):
+            self.law = self.law_by_tag()
+            self._materials = Materials(self.domain, self.law, self.cell_tags)
+
     @property
     def linear_iterations(self) -> list[int]:
         """Krylov iterations of each linear system so far; a direct solver takes one."""

@@ -165,6 +165,19 @@ def test_another_law_takes_over_the_stress(column):
     assert site.fem.evaluate_at(top)["displacement"][0, 1] == pytest.approx(expected, rel=1e-9)
 
 
+def test_one_law_for_all_soils_is_that_of_each(column):
+    """Stages as with the same law for each soil; a stage may then give one of them another."""
+    one, soils = mpm.LinearElastic(young=20e6, poisson=POISSON), SOILS["column"]
+    stages = [bridge.Stage("ground", fill="ground", unit_weight=weights(soils)), bridge.Stage("layer", fill="layer 1")]
+    sites = [site_of(column, laws) for laws in (one, dict.fromkeys(soils, one))]
+    for site in sites:
+        carried_out(site, *stages)
+    assert np.array_equal(*(site.fem.displacement.x.array for site in sites))
+    stiff = bridge.Stage("stiff", law={"layer 1": elastic(soils)["ground"]}, pressure={"surface": 0.0})
+    carried_out(sites[0], stiff)
+    assert len(set(map(id, sites[0].fem.laws))) == 2
+
+
 def test_a_weaker_law_brings_the_stress_inside_its_strength(column):
     laws = elastic(SOILS["column"])
     site = site_of(column, laws, degree=2)
