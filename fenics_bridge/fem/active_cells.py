@@ -36,9 +36,10 @@ def switch_off(model: Any) -> None:
 def reconfigure(model: Any, off: Any, supports: Any, pore_pressure: Any, stress: Any, law: Any) -> None:
     """Apply the changes of `QuasiStatic.reconfigure`."""
     domain, points, before = model.domain, model.points, model.laws
+    off = model.off if off is None else off
     off = tag_numbers(domain.comm, model.cell_tags, off, "off", "cell") if len(off) else ()
     there = cells_there(domain, model.cell_tags, off)
-    water = _nodal_pressure(domain, pore_pressure)
+    water = model._water if pore_pressure is None else _nodal_pressure(domain, pore_pressure)
     law = law if law is not None else model.law
     laws = model._materials.laws(law)
     was_off = np.zeros(points.n, dtype=bool)
@@ -117,9 +118,7 @@ def lonely_nodes(space: Any, there: Any) -> NDArray[np.int32]:
 
 
 def _nodal_pressure(domain: Mesh, pore_pressure: Any) -> Any:
-    """Pore pressure [Pa] as a function that is linear in each cell; None for none."""
-    if pore_pressure is None:
-        return None
+    """Pore pressure [Pa] as a function that is linear in each cell."""
     problem = f"pore_pressure is {pore_pressure!r}, expected a function of positions, such as hydrostatic(2.0)"
     agree(domain.comm, None if callable(pore_pressure) else problem)
     dim = domain.geometry.dim

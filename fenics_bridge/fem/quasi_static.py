@@ -150,7 +150,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
 
     def reconfigure(
         self,
-        off: Sequence[int | str] = (),
+        off: Sequence[int | str] | None = None,
         supports: Sequence[Support] | None = None,
         pore_pressure: OfPosition | None = None,
         stress: OfPosition | None = None,
@@ -158,14 +158,15 @@ class QuasiStatic(SupportedBody, PointFunctions):
     ) -> None:
         """Change soils, laws, supports or pore pressures; `solve` then releases the resulting out-of-balance forces. Collective.
 
-        For stages, see `Stage`: cells of the soils in `off` carry no stress, stiffness or weight; cells that become
+        What is not given stays as it is. For stages, see `Stage`: cells of the soils in `off` carry no stress, stiffness or weight; cells that become
         active start without stress and state, or with the given stress. Afterwards `load.held` is 1, and the body is
         in equilibrium; `solve` to a load with `held` 0, as every new Load has, releases the forces in steps.
 
         Args:
-            off: cell tags or names of the soils that are not there.
+            off: cell tags or names of the soils that are not there; () for none, None for those that are not there now.
             supports: boundary conditions, as for the constructor; None for the present ones, where they are now.
-            pore_pressure: function of positions (n, D) [m] that returns pore pressures (n,) [Pa], or None for none.
+            pore_pressure: function of positions (n, D) [m] that returns pore pressures (n,) [Pa], zero where there is no water; None
+                for the present ones.
             stress: function of positions (n, D) [m] that returns the stresses (n, S) [Pa] of the cells that become active.
             law: law, or laws by cell tag, from now on; where the law changes, its state is reset.
 

@@ -165,6 +165,24 @@ def test_another_law_takes_over_the_stress(column):
     assert site.fem.evaluate_at(top)["displacement"][0, 1] == pytest.approx(expected, rel=1e-9)
 
 
+def test_what_is_not_reconfigured_stays(column):
+    """Stiffer ground under water, below a pit: as before it carries gamma' z, and the base the weight of the saturated ground."""
+    soils = SOILS["column"]
+    site = site_of(column, elastic(soils))
+    wet = bridge.Stage("wet", fill=soils, unit_weight={s: 20e3 for s in soils}, pore_pressure=bridge.hydrostatic(3.0))
+    carried_out(site, wet, bridge.Stage("dig", excavate=soils[1:]))
+    fem, off = site.fem, site.fem.off
+    fem.reconfigure(law={soil: mpm.LinearElastic(young=200e6, poisson=POISSON) for soil in soils})
+    fem.solve(bridge.Load({"ground": 20e3}))
+    stress, depth = there_of(fem.points)
+    assert fem.off == off and len(off) == 2
+    assert np.allclose(stress[:, 1], -10.19e3 * depth, atol=1e-3)
+    assert fem.reaction("base")[1] == pytest.approx(-20e3 * 3, rel=1e-9)
+    fem.reconfigure(off=(), pore_pressure=lambda x: 0 * x[:, 0])
+    fem.solve(bridge.Load(20e3))
+    assert fem.off == () and fem.reaction("base")[1] == pytest.approx(-20e3 * 6, rel=1e-9)
+
+
 def test_one_law_for_all_soils_is_that_of_each(column):
     """Stages as with the same law for each soil; a stage may then give one of them another."""
     one, soils = mpm.LinearElastic(young=20e6, poisson=POISSON), SOILS["column"]
