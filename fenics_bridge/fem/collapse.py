@@ -103,7 +103,8 @@ def factor_of_safety(
 ) -> Collapse:
     """Factor by which the strength can be divided before equilibrium under a load is lost. Collective.
 
-    The model has the reduced laws afterwards.
+    Afterwards the model has its own laws again, and the stresses of the last equilibrium; its `converged` says whether these laws
+    bear them, as they do if the factor is 1 or more.
 
     Args:
         model: finite elements, unloaded or in equilibrium under a load on the way to `load`, with any law that `reduce` knows.
@@ -124,14 +125,18 @@ def factor_of_safety(
     warn_of_locking_at_failure(model)
     law = model.law
     model.law = reduce(law, start, unreduced)
-    steps = model.solve(load, progress=progress)
-    agree(model.domain.comm, None if model.converged else _not_carried(start, steps))
 
     def weaken(factor: float) -> Any:
         return model.equilibrate(load, law=reduce(law, factor, unreduced))
 
-    found = _follow(model, weaken, start, first_step, tolerance, progress)
-    warn_of_few_cells(model, found.mechanism)
+    try:
+        steps = model.solve(load, progress=progress)
+        agree(model.domain.comm, None if model.converged else _not_carried(start, steps))
+        found = _follow(model, weaken, start, first_step, tolerance, progress)
+        warn_of_few_cells(model, found.mechanism)
+    finally:
+        model.law = law
+    model.converged = found.value >= 1.0
     return found
 
 

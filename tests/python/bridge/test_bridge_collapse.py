@@ -31,6 +31,23 @@ def test_factor_of_safety_of_the_slope():
     assert result.value == pytest.approx(1.053, rel=0.02)
 
 
+def test_a_factor_of_safety_leaves_the_soil_as_strong_as_it_was():
+    """The second factor of one body is the first, to the width of the last steps; its stresses are those of equilibrium."""
+    model, load = slope_model(0.2, "fitted"), bridge.Load(unit_weight=15e3)
+    law = model.law
+    first = bridge.factor_of_safety(model, load)
+    assert model.law is law and model.converged and first.value > 1.2
+    assert model.equilibrate(load).residuals[0] < 2 * first.residual  # the soil bears the stresses of weaker soil
+    again = bridge.factor_of_safety(model, load)
+    assert again.value == pytest.approx(first.value, rel=2 * 2e-3)
+    steep = slope_model(0.2, "fitted")
+    assert bridge.factor_of_safety(steep, bridge.Load(unit_weight=30e3)).value < 1.0
+    assert not steep.converged  # the stresses are those of stronger soil
+    with pytest.raises(bridge.InputError, match="start"):
+        bridge.factor_of_safety(steep, bridge.Load(unit_weight=80e3), start=1.0)
+    assert steep.law == law
+
+
 def test_flow_without_dilation_collapses_earlier():
     associated = bridge.collapse_load(slope_model(0.1), weight, first_step=5e3).value
     without = bridge.collapse_load(slope_model(0.1, dilation_angle=0.0), weight, first_step=5e3).value
