@@ -69,7 +69,7 @@ def collapse_load(
 ) -> Collapse:
     """Raise a load until there is no equilibrium: steps double while they converge easily, and are bisected below a failure.
 
-    Collective.
+    Afterwards the model is in the last equilibrium, so that its `converged` is True. Collective.
 
     Args:
         model: finite elements in equilibrium under `load_of(start)`, e.g. fresh and unloaded.
@@ -87,6 +87,7 @@ def collapse_load(
     """
     warn_of_locking_at_failure(model)
     found = _follow(model, lambda value: model.equilibrate(load_of(value)), start, first_step, tolerance, progress)
+    model.converged = True  # under the load of the last equilibrium, whatever the steps above it
     warn_of_few_cells(model, found.mechanism)
     return found
 

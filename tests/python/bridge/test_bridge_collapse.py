@@ -48,6 +48,14 @@ def test_a_factor_of_safety_leaves_the_soil_as_strong_as_it_was():
     assert steep.law == law
 
 
+@pytest.mark.parametrize("tolerance", [0.02, 0.03, 0.05])
+def test_a_collapse_load_ends_in_equilibrium_whichever_step_came_last(tolerance):
+    model = slope_model(0.2, "fitted")
+    found = bridge.collapse_load(model, weight, first_step=5e3, tolerance=tolerance)
+    assert model.converged and model.load == weight(found.value)
+    assert model.reaction(bridge.BASE)[1] == pytest.approx(-found.value * 1.6, rel=1e-6)  # its area [m2]
+
+
 def test_flow_without_dilation_collapses_earlier():
     associated = bridge.collapse_load(slope_model(0.1), weight, first_step=5e3).value
     without = bridge.collapse_load(slope_model(0.1, dilation_angle=0.0), weight, first_step=5e3).value
