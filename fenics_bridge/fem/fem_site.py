@@ -81,7 +81,8 @@ class FemSite:
             Report of the stage.
 
         Raises:
-            InputError: the stage has an unknown soil or boundary; nothing has been changed. Raised on all ranks alike.
+            InputError: the stage has an unknown soil or boundary, and nothing has been changed; or it presses a boundary inside of
+                the soil. Raised on all ranks alike.
             StageError: there is no equilibrium.
         """
         fem = self.fem

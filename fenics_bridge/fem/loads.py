@@ -19,7 +19,7 @@ from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.fields import assembled
 from fenics_bridge.fem.geometry import weighted
-from fenics_bridge.mesh.names import by_number, tag_numbers
+from fenics_bridge.mesh.names import by_number, label, tag_numbers
 from fenics_bridge.types import MeshTags
 
 
@@ -170,6 +170,8 @@ class LoadVectors:
         self._space, self._facet_tags, self._cell_tags = space, facet_tags, cell_tags
         self._test = ufl.TestFunction(space) if test is None else test
         self._weight = {None: self._unit_weight(ufl.dx)}
+        extent = np.ptp(space.mesh.geometry.x, axis=0).max() if len(space.mesh.geometry.x) else 0.0
+        self._size = space.mesh.comm.allreduce(float(extent), MPI.MAX) ** (space.mesh.geometry.dim - 1)
         self._pressure: dict[int, NDArray[np.float64]] = {}
         self._traction: dict[int, list[NDArray[np.float64]]] = {}
 
@@ -225,6 +227,27 @@ class LoadVectors:
         for vector in traction.values():
             self._vector(vector)
         return replace(load, unit_weight=weight, pressure=pressure, traction=traction)
+
+    def require_acting(self, load: Load, before: Load) -> None:
+        """Require that pressures and tractions that a load brings in act on the surface of the soil.
+
+        Args:
+            load: the load, resolved or not.
+            before: the load so far, whose pressures may by now be inside of the soil, where they vanish.
+
+        Raises:
+            InputError: none of the facets of a tag is there. Raised on all ranks alike.
+
+        Note:
+            Collective.
+        """
+        comm, load, before = self._space.mesh.comm, self.resolved(load), self.resolved(before)
+        for name, unit in (("pressure", self._unit_pressure), ("traction", self._unit_tractions)):
+            given, there = getattr(load, name), getattr(before, name)
+            for tag in sorted(tag for tag, value in given.items() if np.any(value) and tag not in there):
+                force = comm.allreduce(float(np.abs(unit(tag)).max(initial=0.0)), MPI.MAX)
+                text = f"{name}: no facet with the tag {label(self._facet_tags, tag)} is on the surface of the soil, expected one there"
+                agree(comm, text if force <= 1e-12 * self._size else None)
 
     def _vector(self, traction: Any) -> Any:
         vector, domain = np.asarray(traction, dtype=float), self._space.mesh

@@ -127,6 +127,7 @@ class MixedQuasiStatic(SupportedBody):
         """
         law = law or self.law
         agree(self.domain.comm, _first_mistake(law))
+        self._loads.require_acting(load, self.load)
         forces = self._loads.forces(load), self._loads.forces(self.load)
         report = find_equilibrium(self._body, [law], *forces, load.displacement, replace(self.solver, **options))
         self.converged = report.converged

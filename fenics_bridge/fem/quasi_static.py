@@ -273,6 +273,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
             InputError: a load or laws that are not possible, or an unknown tag. Raised on all ranks alike.
         """
         law = law or self.law
+        self._loads.require_acting(load, self.load)
         forces = self._loads.forces(load), self._loads.forces(self.load)
         solver = replace(self.solver, **options)
         self.points.duration = duration

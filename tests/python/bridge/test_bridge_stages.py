@@ -183,6 +183,26 @@ def test_what_is_not_reconfigured_stays(column):
     assert fem.off == () and fem.reaction("base")[1] == pytest.approx(-20e3 * 6, rel=1e-9)
 
 
+@pytest.mark.parametrize("load", [{"pressure": {"surface": 5e3}}, {"traction": {"surface": (0.0, -5e3)}}])
+def test_loads_inside_of_the_soil_are_refused(column, load):
+    """A pressure inside acts on both sides, and a traction needs a surface; where the soil above is away, both load the ground."""
+    laws, kind = elastic(SOILS["column"]), next(iter(load))
+    with pytest.raises(mpm.InputError, match=rf"{kind}: no facet with the tag 'surface' is on the surface of the soil"):
+        at_once(column, SOILS["column"], laws, bridge.Load(**load))
+    assert at_once(column, ["ground"], laws, bridge.Load(**load)).reaction("base")[1] == pytest.approx(-5e3)
+
+
+def test_a_pressure_that_is_filled_over_is_taken_away(column):
+    soils = SOILS["column"]
+    site = site_of(column, elastic(soils))
+    pressed = bridge.Stage("pressed", fill="ground", unit_weight=weights(soils), pressure={"surface": 5e3})
+    carried_out(site, pressed, bridge.Stage("over it", fill="layer 1"), bridge.Stage("more", fill="layer 2"))
+    assert site.fem.reaction("base")[1] == pytest.approx(-(3 * 20e3 + 18e3 + 2 * 16e3))
+    covered = site_of(column, elastic(soils))
+    with pytest.raises(mpm.InputError, match="pressure: no facet with the tag 'surface' is on the surface of the soil"):
+        covered.carry_out(bridge.Stage("all", fill=soils, unit_weight=weights(soils), pressure={"surface": 5e3}))
+
+
 def test_one_law_for_all_soils_is_that_of_each(column):
     """Stages as with the same law for each soil; a stage may then give one of them another."""
     one, soils = mpm.LinearElastic(young=20e6, poisson=POISSON), SOILS["column"]
