@@ -332,6 +332,11 @@ class QuasiStatic(SupportedBody, PointFunctions):
         """As of `SupportedBody`: of the soil, and of its pore water on the facets in the components that are held. Collective."""
         return super().reaction(facet_tag) + water_on_supports(self, facet_tag)
 
+    def largest_pore_pressure(self) -> float:
+        """Largest pore pressure at a node [Pa]; 0 without water. Collective."""
+        nodal = np.zeros(0) if self._water is None else self._water.x.array
+        return max(self.domain.comm.allgather(float(nodal.max(initial=0.0))))
+
     def stress_function(self, smooth: bool = False) -> fem.Function:
         """The stress as a function. Collective.
 

@@ -18,6 +18,7 @@ from fenics_bridge.fem.elastic import ElasticSolution
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.fem.geometry import Geometry, require_same_geometry
 from fenics_bridge.fem.quasi_static import QuasiStatic
+from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.transfer.dried import balance_dried_soil
 from fenics_bridge.transfer.moved import cell_gradient, fitted_volumes, held_volumes, volume_change
 from fenics_bridge.water.consolidation import Consolidation
@@ -70,7 +71,7 @@ def initialise(
 
     Each particle takes the stress, the state and the accumulated strain of the finite elements where it is, is returned
     to the yield surface should it be outside, and loses its velocity. The model's gravity must be that of the
-    equilibrium, and its geometry that of the finite elements.
+    equilibrium, its loads and supports too, and its geometry that of the finite elements.
 
     On the same cells, particles are in equilibrium at once (out of balance by rounding) with linear elements, and in
     plane strain and 3D with quadratic ones, whose cell means linear test functions cannot distinguish from their stresses.
@@ -110,6 +111,7 @@ def initialise(
     particles = model.particles
     _require_usable(model, fem, move)
     _warn_of_other_weight(model, fem)
+    _warn_of_missing_loads(model, fem)
     if resting:
         agree(model.comm, "move is True, expected False with resting: resting cells are not moved" if move else None)
         model.rest()
@@ -220,6 +222,33 @@ def _warn_of_other_weight(model: mpm.Model, fem: Any) -> None:
         warnings.warn(
             f"the unit weight of particles is {low if too_low else high:.5g} N/m3, density times gravity, that of the finite "
             f"elements {min(carried):.5g} to {max(carried):.5g} N/m3: their equilibrium is another one",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+
+
+def _warn_of_missing_loads(model: mpm.Model, fem: Any) -> None:
+    """Warn, on the first rank, of loads of the finite elements where particles carry no forces. Collective."""
+    if not isinstance(fem, QuasiStatic):
+        return
+    load, comm = fem.load, model.comm
+    missing = [
+        name for name in ("pressure", "traction") if any(np.any(value) for value in getattr(load, name).values())
+    ]
+    if fem.largest_pore_pressure() > 0:
+        missing.append("pore pressure")
+    if comm.allreduce(float(np.abs(model.particles.traction).max(initial=0.0)), MPI.MAX) > 0 or model._contacts:
+        missing = []
+    held = {condition[0] for condition in model._conditions}
+    for support in fem.supports if load.displacement else ():
+        if any(support.displacement or ()) and held.isdisjoint(
+            tag_numbers(fem.domain.comm, fem.facet_tags, support.facet_tag, "supports")
+        ):
+            missing.append(f"prescribed displacement at {support.facet_tag!r}")
+    if missing and comm.rank == 0:
+        warnings.warn(
+            f"the finite elements carry {', '.join(missing)}, which particles do not have, so that their equilibrium is another one: "
+            'give it to them before, by Model.traction, load_surface, particles.set("traction", ...) or fix',
             RuntimeWarning,
             stacklevel=3,
         )

@@ -23,6 +23,7 @@ import mpm_core as mpm
 from fenics_bridge import compat
 from fenics_bridge.mesh.tagged import cell_volumes
 from fenics_bridge.transfer.moved import fitted_volumes, held_volumes, simplex_samples
+from fenics_bridge.transfer.particle_forces import seepage_forces
 
 UNIT_WEIGHT = 18e3
 
@@ -250,6 +251,51 @@ def test_particles_of_another_weight_are_said(weight, said):
         bridge.initialise(slope_particles(weight), solved(degree=1), equilibrate=False)
     words = f"unit weight of particles is {weight:.5g} N/m3"
     assert any(words in str(one.message) for one in caught) == said
+
+
+@pytest.mark.parametrize(
+    ("load", "given", "said"),
+    [
+        ({"pressure": {4: 5e3}}, None, "pressure"),
+        ({"traction": {4: (1e3, -5e3)}}, None, "traction"),
+        ({"pressure": {4: 0.0}}, None, ""),
+        ({"pressure": {4: 5e3}}, lambda model: model.traction(4, (0.0, -5e3)), ""),
+        ({"pore_pressure": bridge.hydrostatic(1.0)}, None, "pore pressure"),
+        ({"pore_pressure": lambda x: 0 * x[:, 0]}, None, ""),
+        (
+            {"pore_pressure": bridge.hydrostatic(1.0)},
+            lambda model: model.particles.set("traction", seepage_forces(model, bridge.hydrostatic(1.0))),
+            "",
+        ),
+        ({"displacement": 1.0}, None, "prescribed displacement at 4"),
+        ({"displacement": 1.0}, lambda model: model.fix(4), ""),
+        ({"displacement": 0.0}, None, ""),
+    ],
+)
+def test_loads_that_particles_lack_are_said(load, given, said):
+    """Once, with their names; particles without them are far from equilibrium."""
+    domain, cell_tags, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (1.0, 1.0), (4, 4))
+    law, load = mpm.LinearElastic(young=1e7, poisson=0.3), dict(load)
+    supports = [bridge.fixed(3), bridge.roller(1, (1, 0)), bridge.roller(2, (1, 0))]
+    pushed = [bridge.prescribed(4, (0.0, -1e-3))] if "displacement" in load else []
+    fem_model = bridge.QuasiStatic(domain, law, facet_tags, [*supports, *pushed], 1)
+    if "pore_pressure" in load:
+        fem_model.reconfigure(pore_pressure=load.pop("pore_pressure"))
+    fem_model.solve(bridge.Load(unit_weight=20e3, **load))
+    model = mpm.Model(bridge.background_mesh(domain, cell_tags, facet_tags), law)
+    model.seed(density=20e3 / 9.81, per_cell=3)
+    bridge.apply_supports(model, supports)
+    model.set_gravity((0.0, -9.81))
+    if given is not None:
+        given(model)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        handover = bridge.initialise(model, fem_model, equilibrate=False)
+    texts = [str(one.message) for one in caught if "the finite elements carry" in str(one.message)]
+    assert [text[: len(text.split(", which")[0])] for text in texts] == (
+        [f"the finite elements carry {said}"] if said else []
+    )
+    assert said == "" or handover.unbalanced_ratio > 0.01
 
 
 def test_materials_are_matched_place_by_place():
