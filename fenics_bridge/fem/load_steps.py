@@ -151,6 +151,7 @@ def raise_load(
     Sets `converged` of the model to whether the load was reached, and warns if it was not. Collective.
     """
     start = model.load
+    _warn_of_unmoved(model, load)
     steps = advance(
         lambda fraction: model.equilibrate(start.towards(load, fraction)), 0.0, 1.0, first_step, tolerance, progress
     )
@@ -158,6 +159,17 @@ def raise_load(
     if not model.converged and MPI.COMM_WORLD.rank == 0:
         warnings.warn(_not_reached(steps), RuntimeWarning, stacklevel=3)
     return steps
+
+
+def _warn_of_unmoved(model: Any, load: Load) -> None:
+    """Warn of a load that leaves prescribed displacements out, or takes them back."""
+    moved = next((support for support in model.supports if any(support.displacement or ())), None)
+    if moved and load.displacement == 0 and MPI.COMM_WORLD.rank == 0:
+        warnings.warn(
+            f"displacement of the load is 0, so that {moved} is held at zero; Load(displacement=1.0) prescribes its displacement",
+            RuntimeWarning,
+            stacklevel=4,
+        )
 
 
 def _not_reached(steps: list[LoadStep]) -> str:

@@ -63,11 +63,15 @@ def roller(facet_tag: int | str, normal: ArrayLike) -> Support:
 
 
 def prescribed(facet_tag: int | str, displacement: Sequence[float | None]) -> Support:
-    """Prescribed displacement on a part of the boundary.
+    """Prescribed displacement on a part of the boundary, of which a load applies the fraction `Load.displacement`, by default 0.
 
     Args:
         facet_tag: number or name of the tag of the facets.
         displacement: components of the displacement [m], shape (D,); None leaves a component free.
+
+    Example:
+        >>> fem = bridge.QuasiStatic(domain, soil, facet_tags, [bridge.fixed("base"), bridge.prescribed("plate", (None, -0.01))])
+        >>> fem.solve(bridge.Load(unit_weight=20e3, displacement=1.0))  # the plate moves down by 10 mm
     """
     return Support(facet_tag, tuple(displacement))
 

@@ -42,6 +42,21 @@ def test_displacements_larger_than_the_body_are_named():
         body(mpm.LinearElastic(young=20.0, poisson=0.3)).solve(bridge.Load(unit_weight=20e3))
 
 
+def test_displacements_that_a_load_leaves_out_are_named():
+    """Also where a later load would take them back; with displacement=1 the top moves, and nothing is said."""
+    model = body(supports=[*HELD, bridge.prescribed(TOP, (None, -0.01))])
+    words = r"displacement of the load is 0, so that .*facet_tag=4.* is held at zero; Load\(displacement=1.0\)"
+    with pytest.warns(RuntimeWarning, match=words):
+        model.solve(bridge.Load(unit_weight=20e3))
+    top, moved = [[1.0, 1.0]], {"displacement": 1.0}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model.solve(bridge.Load(unit_weight=20e3, **moved))
+        assert model.evaluate_at(top)["displacement"][0, 1] == pytest.approx(-0.01)
+    with pytest.warns(RuntimeWarning, match=words):
+        model.solve(bridge.Load(unit_weight=18e3))
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
