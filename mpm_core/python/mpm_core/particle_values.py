@@ -108,7 +108,8 @@ class ParticleValues:
                 particles are now.
 
         Raises:
-            InputError: on all ranks: no law varies in the parameter, another shape, a value out of the parameter's range.
+            InputError: on all ranks: no law varies in the parameter, no particles, another shape, a value out of the parameter's
+                range.
 
         Example:
             >>> soil = mpm.Heterogeneous(mpm.tresca(young=3e6, poisson=0.45, shear_strength=12e3), ["cohesion"])
@@ -122,6 +123,10 @@ class ParticleValues:
             new = parameter_values(name, values, self.particles.position, of_cell, tags)
             return differences_of(name, new, self.laws, self.particles.material, self.particles.state)
 
+        if self.comm.allreduce(len(self.particles)) == 0:
+            raise InputError(
+                f"values of {name!r} are for particles, of which the model has none: give them after seeding"
+            )
         self.particles.set("state", collectively(self.comm, checked))
 
     def _state_columns(self, name: str) -> list[tuple[int, int]]:

@@ -127,6 +127,17 @@ def test_removed_particles_are_gone_and_the_others_stay(tmp_path):
     assert dict(zip(model.particles.id.tolist(), model.particles.stress.tolist())) == kept
 
 
+def test_values_of_a_parameter_need_particles(tmp_path):
+    """Before the stage that places the soil they would be lost; after it the particles have them."""
+    varying = mpm.Heterogeneous(elastic(["ground"])["ground"], ["young"])
+    site = particle_site(mesh_of("pit", tmp_path), {"ground": varying}, small_displacements=True)
+    with pytest.raises(mpm.InputError, match="values of 'young' are for particles, of which the model has none"):
+        site.model.set_parameter("young", 8e6)
+    site.carry_out(bridge.Stage("in situ", fill="ground", unit_weight=weights(["ground"])))
+    site.model.set_parameter("young", 8e6)
+    assert np.allclose(site.model.parameter("young"), 8e6)
+
+
 def test_one_of_several_sides_of_a_support_is_released(tmp_path):
     """Particles at "sides" of which one goes are held as by a support at the other alone."""
     domain, cell_tags, facet_tags = mesh_of("pit", tmp_path)
