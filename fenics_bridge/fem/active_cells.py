@@ -16,6 +16,7 @@ import numpy as np
 import ufl
 from dolfinx import fem, la
 from dolfinx.mesh import Mesh
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenics_bridge import compat
@@ -26,6 +27,7 @@ from fenics_bridge.fem.loads import LoadVectors, pressing
 from fenics_bridge.fem.supports import Constraints, held_components
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.mesh.tagged import owned_cells, tag_values
+from fenics_bridge.types import OfPosition
 
 
 def switch_off(model: Any) -> None:
@@ -123,9 +125,18 @@ def _nodal_pressure(domain: Mesh, pore_pressure: Any) -> Any:
     agree(domain.comm, None if callable(pore_pressure) else problem)
     dim = domain.geometry.dim
     p = fem.Function(compat.function_space(domain, "Lagrange", 1), name="pore_pressure")
-    p.interpolate(lambda x: np.broadcast_to(np.asarray(pore_pressure(x[:dim].T), dtype=float), x.shape[1]))
-    agree(domain.comm, None if np.all(np.isfinite(p.x.array)) else "pore_pressure gives values that are not finite")
+    x = p.function_space.tabulate_dof_coordinates()[:, :dim]
+    p.x.array[:] = pressures_at(domain.comm, pore_pressure, x)
     return p
+
+
+def pressures_at(comm: MPI.Comm, pore_pressure: OfPosition, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Pore pressures (n,) [Pa] at positions (n, D) [m]; raises InputError, on all ranks, for other values. Collective."""
+    given = np.asarray(pore_pressure(x), dtype=float)
+    good = given.shape in ((), (len(x),))
+    agree(comm, None if good else f"pore_pressure gives values of shape {given.shape}, expected ({len(x)},)")
+    agree(comm, None if np.all(np.isfinite(given)) else "pore_pressure gives values that are not finite")
+    return np.broadcast_to(given, len(x))
 
 
 def _seepage_forces(space: Any, p: Any, there: Any, radius: Any) -> Any:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.mesh import Mesh
+from dolfinx.mesh import CellType, Mesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 
@@ -29,9 +29,13 @@ def geometry_of(domain: Mesh, given: Geometry | None = None) -> Geometry:
         given: geometry; None for plane strain in two dimensions and a solid in three.
 
     Raises:
-        InputError: the geometry does not go with the dimension, or radii are below zero. Raised on all ranks alike.
+        InputError: other cells than triangles and tetrahedra, a geometry that does not go with the dimension, or radii below zero.
+            Raised on all ranks alike.
     """
-    dim = domain.geometry.dim
+    dim, kind = domain.geometry.dim, domain.topology.cell_type
+    simplices = {2: CellType.triangle, 3: CellType.tetrahedron}
+    text = f"domain has cells of the kind {kind.name} in {dim} dimensions, expected triangles in 2 or tetrahedra in 3"
+    agree(domain.comm, None if simplices.get(dim) == kind else text)
     usual = Geometry.PLANE_STRAIN if dim == 2 else Geometry.SOLID
     geometry = usual if given is None else given
     fits = geometry == usual or (geometry == Geometry.AXISYMMETRIC and dim == 2)

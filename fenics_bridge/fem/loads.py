@@ -79,15 +79,16 @@ def require_finite(comm: MPI.Comm, load: Load) -> None:
         if name in ("pressure", "traction") and not isinstance(value, dict):
             problem = f"{name} is {value!r}, expected a dictionary by facet tag or name"
             continue
-        wrong = [v for v in (value.values() if isinstance(value, dict) else [value]) if not _is_finite(v)]
+        scalar = name != "traction"
+        wrong = [v for v in (value.values() if isinstance(value, dict) else [value]) if not _is_finite(v, scalar)]
         if wrong:
             problem = f"{name} is {wrong[0]!r}, expected finite numbers"
     agree(comm, problem)
 
 
-def _is_finite(value: Any) -> bool:
+def _is_finite(value: Any, scalar: bool) -> bool:
     numbers = np.asarray(value)
-    return numbers.dtype.kind in "iuf" and bool(np.isfinite(numbers).all())
+    return not (scalar and numbers.ndim) and numbers.dtype.kind in "iuf" and bool(np.isfinite(numbers).all())
 
 
 def _arrays(tractions: Any) -> Any:

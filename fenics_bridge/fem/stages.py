@@ -140,6 +140,10 @@ def carry_out(site: FemSite | ParticleSite, stages: Iterable[Stage]) -> Iterator
         >>> for report in bridge.carry_out(bridge.FemSite(fem), stages):
         ...     print(report.name, report.largest_displacement)
     """
+    if isinstance(stages, Stage) or not hasattr(site, "carry_out"):
+        raise InputError(
+            f"site is a {type(site).__name__} and stages a {type(stages).__name__}, expected a FemSite or ParticleSite and a list"
+        )
     for stage in stages:
         yield site.carry_out(stage)
 
@@ -243,6 +247,16 @@ class SiteState:
 
 def _wrong_value(stage: Stage, where: str) -> str | None:
     """Error in the values of a stage; None without an error."""
+    for name in ("unit_weight", "pressure", "law"):
+        if not isinstance(getattr(stage, name), dict):
+            what = "boundary" if name == "pressure" else "soil"
+            return f"{where}{name} is {getattr(stage, name)!r}, expected a dictionary by {what}"
+    for support in stage.support:
+        if not isinstance(support, Support):
+            return f"{where}support is {support!r}, expected what `fixed`, `roller` and `prescribed` return"
+    for name in ("pore_pressure", "stress"):
+        if not (getattr(stage, name) is None or callable(getattr(stage, name))):
+            return f"{where}{name} is {getattr(stage, name)!r}, expected a function of positions"
     for name in ("unit_weight", "pressure"):
         for key, value in getattr(stage, name).items():
             if not (np.isscalar(value) and np.isfinite(value)):

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import InputError, agree
+from fenics_bridge.errors import InputError, agree, is_finite
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.mesh.tagged import require_tags_of
 from fenics_bridge.types import MeshTags
@@ -72,7 +72,12 @@ def prescribed(facet_tag: int | str, displacement: Sequence[float | None]) -> Su
     Example:
         >>> fem = bridge.QuasiStatic(domain, soil, facet_tags, [bridge.fixed("base"), bridge.prescribed("plate", (None, -0.01))])
         >>> fem.solve(bridge.Load(unit_weight=20e3, displacement=1.0))  # the plate moves down by 10 mm
+
+    Raises:
+        InputError: displacement is no sequence.
     """
+    if isinstance(displacement, str) or not hasattr(displacement, "__iter__"):
+        raise InputError(f"displacement is {displacement!r}, expected its components, such as (None, -0.01)")
     return Support(facet_tag, tuple(displacement))
 
 
@@ -229,6 +234,6 @@ def _first_mistake(domain: Mesh, facet_tags: MeshTags, supports: Sequence[Suppor
         displacement = support.displacement
         if displacement is not None and len(displacement) != dim:
             return f"supports: {support} has {len(displacement)} components, expected {dim}"
-        if displacement is not None and not all(v is None or np.isfinite(v) for v in displacement):
-            return f"supports: {support} has a value that is not finite"
+        if displacement is not None and not all(v is None or is_finite(v) for v in displacement):
+            return f"supports: {support} has a value that is no finite number"
     return None

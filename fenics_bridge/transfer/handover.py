@@ -197,6 +197,12 @@ def _require_usable(model: mpm.Model, fem: Any, move: bool) -> None:
     solved = not isinstance(fem, QuasiStatic) or fem.converged
     agree(model.comm, None if solved else "fem has not been solved, or its last solution did not converge")
     require_same_geometry(model, fem)
+    agree(
+        model.comm,
+        None
+        if model.comm.allreduce(len(model.particles))
+        else "model has no particles, expected some: seed them before",
+    )
     fits = (model._core.water is not None) == isinstance(fem, Consolidation)
     problem = (
         f"fem is a {type(fem).__name__}, expected a water.Consolidation where particles have pore water (Model.add_water), "

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 import mpm_core as mpm
 from fenics_bridge.errors import agree
+from fenics_bridge.fem.active_cells import pressures_at
 from fenics_bridge.types import OfPosition
 from mpm_core import Geometry
 
@@ -49,11 +50,10 @@ def seepage_forces(model: mpm.Model, pore_pressure: OfPosition) -> NDArray[np.fl
         Shape (n, D) [N], [N/m] in plane strain, [N] per radian in an axisymmetric body.
 
     Raises:
-        InputError: a pore pressure is not finite. Raised on all ranks alike.
+        InputError: pore pressures of another shape or not finite. Raised on all ranks alike.
     """
     mesh, cells = model.mesh, model.particles.cell
-    p = np.broadcast_to(np.asarray(pore_pressure(mesh.points), dtype=float), len(mesh.points))
-    agree(model.comm, None if np.all(np.isfinite(p)) else "pore_pressure gives values that are not finite")
+    p = pressures_at(model.comm, pore_pressure, mesh.points)
     gradient = np.einsum("ck,ckd->cd", p[mesh.cells], _gradients(mesh))
     force = -model.particles.volume[:, None] * gradient[cells]
     suction = np.maximum(-p, 0.0)

@@ -91,6 +91,13 @@ class ParticleSite:
             **self._material,
             **{tag: self._number_of(state.law[tag], stage) for tag in stage_laws(stage, state)},
         }
+        without = next((tag for tag in fill if tag not in material), None)
+        problem = (
+            f"materials has no law for the soil {self.state._name_of(without)}, expected one"
+            if without is not None
+            else None
+        )
+        agree(model.comm, problem)
         self._refuse_resting(state, stage)
         if stage.reset_displacement:
             model.particles.set("initial_position", model.particles.position)
@@ -136,7 +143,10 @@ class ParticleSite:
         self._seeded.append((first, model._next_id, tag))
         if stage.stress is not None:
             stress, rows = model.particles.stress.copy(), self.rows_of(tag) & (model.particles.id >= first)
-            stress[rows] = stage.stress(model.particles.position[rows])
+            given, expected = np.asarray(stage.stress(model.particles.position[rows]), dtype=float), stress[rows].shape
+            good = given.shape == expected and np.all(np.isfinite(given))
+            agree(model.comm, None if good else f"stress has shape {given.shape}, expected finite {expected}")
+            stress[rows] = given
             model.particles.set("stress", stress)
 
     def _number_of(self, law: Any, stage: Stage) -> int:

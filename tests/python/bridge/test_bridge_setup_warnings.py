@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from dolfinx.mesh import CellType, create_rectangle, locate_entities_boundary, meshtags
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -15,8 +16,8 @@ HELD = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(
 ELASTIC = mpm.LinearElastic(young=1e7, poisson=0.3)
 
 
-def body(law=ELASTIC, supports=HELD, **options):
-    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (2.0, 1.0), (4, 2))
+def body(law=ELASTIC, supports=HELD, domain=None, **options):
+    domain, facet_tags = domain or bridge.box_mesh(MPI.COMM_WORLD, (2.0, 1.0), (4, 2))[::2]
     return bridge.QuasiStatic(domain, law, facet_tags, supports, **options)
 
 
@@ -40,6 +41,61 @@ def test_displacements_larger_than_the_body_are_named():
         RuntimeWarning, match="largest displacement is 371 m, more than the size of the body, 2 m.*Moduli are in Pa"
     ):
         body(mpm.LinearElastic(young=20.0, poisson=0.3)).solve(bridge.Load(unit_weight=20e3))
+
+
+def site(particles=False):
+    domain, cell_tags, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (2.0, 1.0), (4, 2))
+    if particles:
+        return bridge.ParticleSite(
+            mpm.Model(bridge.background_mesh(domain, cell_tags, facet_tags), ELASTIC), {1: 0}, HELD
+        )
+    return bridge.FemSite(bridge.QuasiStatic(domain, ELASTIC, facet_tags, HELD, cell_tags=cell_tags))
+
+
+def quadrilaterals():
+    domain = create_rectangle(MPI.COMM_WORLD, [[0, 0], [1, 1]], [2, 2], CellType.quadrilateral)
+    facets = locate_entities_boundary(domain, 1, lambda x: np.isclose(x[1], 0))
+    return domain, meshtags(domain, 1, np.sort(facets), np.full(len(facets), BASE, np.int32))
+
+
+def placed(particles=False, **stage):
+    return site(particles).carry_out(bridge.Stage("a", fill=1, **{"unit_weight": {1: 20e3}, **stage}))
+
+
+def without_particles():
+    fem, mesh = body(), bridge.box_mesh(MPI.COMM_WORLD, (2.0, 1.0), (4, 2))
+    fem.solve(bridge.Load(unit_weight=20e3))
+    bridge.initialise(mpm.Model(bridge.background_mesh(*mesh), ELASTIC), fem)
+
+
+def without_material():
+    mesh = bridge.background_mesh(*bridge.box_mesh(MPI.COMM_WORLD, (2.0, 1.0), (4, 2)))
+    bridge.ParticleSite(mpm.Model(mesh, ELASTIC), {}, HELD).carry_out(bridge.Stage("a", fill=1, unit_weight={1: 20e3}))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda: bridge.prescribed(TOP, -0.01), "displacement is -0.01, expected its components"),
+        (lambda: body(supports=[bridge.prescribed(TOP, ("a", 0))]), "supports: .*'a'.* no finite number"),
+        (lambda: body().solve(bridge.Load(unit_weight=[0, -20e3])), r"unit_weight is \[0, -20000.0\], expected finite numbers"),
+        (lambda: body().solve(bridge.Load(pressure={TOP: (0, 5e3)})), r"pressure is \(0, 5000.0\), expected finite numbers"),
+        (lambda: placed(unit_weight=20e3), "stage 'a': unit_weight is 20000.0, expected a dictionary by soil"),
+        (lambda: placed(support="base"), "stage 'a': support is 'base', expected what `fixed`"),
+        (lambda: placed(stress=np.zeros((8, 4))), "(?s)stage 'a': stress is .*, expected a function of positions"),
+        (lambda: placed(pore_pressure=lambda x: x), r"pore_pressure gives values of shape \(15, 2\), expected \(15,\)"),
+        (lambda: placed(True, pore_pressure=lambda x: x), r"pore_pressure gives values of shape \(15, 2\)"),
+        (lambda: placed(True, stress=lambda x: x), r"stress has shape \(48, 2\), expected finite \(48, 4\)"),
+        (without_material, "materials has no law for the soil 1, expected one"),
+        (lambda: list(bridge.carry_out(site(), bridge.Stage("a"))), "site is a FemSite and stages a Stage, expected"),
+        (lambda: list(bridge.carry_out(body(), [])), "site is a QuasiStatic and stages a list, expected"),
+        (lambda: body(domain=quadrilaterals()), "cells of the kind quadrilateral in 2 dimensions, expected triangles"),
+        (without_particles, "model has no particles, expected some"),
+    ],
+)  # fmt: skip
+def test_values_of_another_kind_are_errors_that_name_them(wrong, words):
+    with pytest.raises(mpm.InputError, match=words):
+        wrong()
 
 
 def test_displacements_that_a_load_leaves_out_are_named():
