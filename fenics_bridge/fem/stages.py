@@ -229,8 +229,8 @@ class SiteState:
         kept: list[Support] = []
         for support in self.supports:
             numbers = self._facets_of(support.facet_tag, where + "support")
-            left = [number for number in numbers if number not in gone]
-            tags = [support.facet_tag] if len(left) == len(numbers) else left
+            left: list[int | str] = [number for number in numbers if number not in gone]
+            tags: list[int | str] = [support.facet_tag] if len(left) == len(numbers) else left
             # What was prescribed in an earlier stage has happened, and is held now.
             held_now = support.displacement and tuple(v and 0.0 for v in support.displacement)
             kept += [replace(support, facet_tag=tag, displacement=held_now) for tag in tags]
