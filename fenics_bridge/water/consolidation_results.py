@@ -56,7 +56,7 @@ class ConsolidationResults(SupportedBody, PointFunctions):
             Effective stress [Pa], constant in each cell, the mean of its points, unless `smooth`.
         """
         mean = self.points.cell_function(self.points.stress, "effective_stress", 0)
-        return nodal_average(mean, self.radius) if smooth else mean
+        return nodal_average(mean, self.radius, self.active_function()) if smooth else mean
 
     @property
     def laws(self) -> list[Any]:

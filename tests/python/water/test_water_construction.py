@@ -177,3 +177,19 @@ def test_particles_take_over_the_soil_that_is_there():
     in_fill = p.position[:, 1] > 1.0
     excess = p.pore_pressure[~in_fill] - OF_WATER * (1.0 - p.position[~in_fill, 1])
     assert np.abs(p.pore_pressure[in_fill]).max() < 1e-6 * OF_WATER and excess.max() > 0.5 * LAYER * WEIGHT
+
+
+def test_smooth_stresses_are_those_of_the_soil_that_is_there():
+    """Not halved by the stress of zero of cells that are not there: below the surface of the first layer of fill."""
+    model = _model(_ground(), water.Element.STABILISED)
+    model.reconfigure(off=[SECOND])
+    _run(model, 0.01)
+    stress = model.stress_function().x.array.reshape(-1, 4)
+    smooth = model.stress_function(smooth=True)
+    domain, cell_tags, _ = _ground()
+    height = compute_midpoints(domain, 2, np.arange(len(stress), dtype=np.int32))[:, 1]
+    top = (height > 1.15) & (height < 1.0 + LAYER)
+    nodes = smooth.function_space.tabulate_dof_coordinates()[:, 1]
+    found = smooth.x.array.reshape(-1, 4)[np.abs(nodes - 1.0 - LAYER) < 1e-9, 1]
+    assert found.size and top.any() and stress[top, 1].max() < 0
+    assert (stress[top, 1].min() <= found).all() and (found <= stress[top, 1].max()).all()
