@@ -46,7 +46,7 @@ def test_a_disk_that_is_full_during_the_slide(small_disk):
 
 @pytest.mark.parametrize("small_disk", ["1300k"], indirect=True)
 def test_a_disk_too_small_for_the_pictures_alone(small_disk):
-    result = slope(small_disk / "slope", "--frames", "2")
+    result = slope(small_disk / "slope", "--frames", "2", "--pictures")
     assert result.returncode == 1 and "Traceback" not in result.stderr, result.stderr
     assert "cannot write" in result.stderr.strip().splitlines()[-1]
     summary = json.loads((small_disk / "slope" / "summary.json").read_text())
