@@ -66,6 +66,8 @@ class ConsolidationResults(SupportedBody, PointFunctions):
     def evaluate_at(self, points: ArrayLike) -> dict[str, NDArray[np.float64]]:
         """Values at points, whichever ranks have the points and their cells. Collective.
 
+        On the border of soil that has been removed the values are those of the soil that is there.
+
         Args:
             points: positions [m], shape (n, D).
 
@@ -75,9 +77,8 @@ class ConsolidationResults(SupportedBody, PointFunctions):
         Raises:
             InputError: a point is outside the body; the message names it. Raised on all ranks alike.
         """
-        return evaluate_at(
-            points, displacement=self.displacement, pressure=self.pressure, stress=self.stress_function()
-        )
+        values = {"pressure": self.pressure, "stress": self.stress_function()}
+        return evaluate_at(points, self.active_function(), displacement=self.displacement, **values)
 
     def pore_pressure(self, suction: bool = False, outside: OfPosition | None = None) -> OfPosition:
         """The pore pressure as a function of positions, for stages, collapse loads and factors of safety, as of `Seepage`.

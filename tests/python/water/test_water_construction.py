@@ -186,6 +186,8 @@ def test_smooth_stresses_are_those_of_the_soil_that_is_there():
     _run(model, 0.01)
     stress = model.stress_function().x.array.reshape(-1, 4)
     smooth = model.stress_function(smooth=True)
+    border = model.evaluate_at([[x, 1.0 + LAYER] for x in (0.05, 0.1, 0.15)])["stress"]
+    assert (border[:, 1] < -100).all()
     domain, cell_tags, _ = _ground()
     height = compute_midpoints(domain, 2, np.arange(len(stress), dtype=np.int32))[:, 1]
     top = (height > 1.15) & (height < 1.0 + LAYER)
