@@ -21,7 +21,7 @@ from fenics_bridge.fem.solver import PRACTICE, Solver
 from fenics_bridge.fem.stages import Stage, StageError, StageReport, carry_out, hydrostatic
 from fenics_bridge.fem.strength import davis_reduced_strength, davis_strength, reduced_strength
 from fenics_bridge.fem.supports import Support, fixed, flat_normal, prescribed, roller
-from fenics_bridge.forms import mend_cache, redirect_compiler_lines
+from fenics_bridge.forms import redirect_compiler_lines, repair_cache
 from fenics_bridge.mesh.background import background_arrays, background_mesh, original_cells
 from fenics_bridge.mesh.box_mesh import BODY, box_mesh
 from fenics_bridge.mesh.graded import graded_tags
@@ -50,4 +50,4 @@ __all__ = [
 # fmt: on
 
 redirect_compiler_lines()
-mend_cache()
+repair_cache()

@@ -76,6 +76,6 @@ def _module_or_error(module_name: str, object_names: Any, cache_dir: Any, timeou
         ) from None
 
 
-def mend_cache() -> None:
+def repair_cache() -> None:
     """Compile forms anew whose compilation was broken off, and say which file is in the way where another run may compile them."""
     jit.get_cached_module = _module_or_error

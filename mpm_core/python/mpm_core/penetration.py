@@ -24,14 +24,14 @@ class PenetrationWatch:
 
     def __init__(self, model: Model) -> None:
         self._model = model
-        self._told: set[int] = set()
+        self._warned: set[int] = set()
 
     def look(self) -> None:
         """Warn if the soil has sunk into a surface. Collective."""
         model = self._model
         entries = enumerate(zip(model.contacts, model._contacts, strict=True))
         open_ones = [
-            (k, contact, entry) for k, (contact, entry) in entries if k not in self._told and not entry["bonded"]
+            (k, contact, entry) for k, (contact, entry) in entries if k not in self._warned and not entry["bonded"]
         ]
         if not open_ones:
             return
@@ -41,7 +41,7 @@ class PenetrationWatch:
             cells = state["penetration"] / size
             if cells <= DEEPEST:
                 continue
-            self._told.add(k)
+            self._warned.add(k)
             if model.comm.rank == 0:
                 stiffer = f"penalty=1 of add_contact in place of {entry['penalty']:g}" if entry["penalty"] < 1 else ""
                 warnings.warn(
