@@ -41,7 +41,9 @@ class PointSearch:
         near = np.array([np.all((points >= low) & (points <= high), axis=1) for low, high in boxes])
         self._ranks, self._rows = np.nonzero(near)  # that may have a point, by rising rank
         asked, self._askers = exchange_rows(self._comm, self._ranks, points[self._rows])
-        preferred = np.ones(owned_cells(domain)) if active is None else active.x.array[: owned_cells(domain)]
+        preferred = np.ones(owned_cells(domain))
+        if active is not None:
+            preferred = active.x.array[compat.cell_dofs(active.function_space)[: len(preferred), 0]]
         cells = local_cells(domain, asked, preferred)
         self._inside = cells >= 0
         self._cells = cells[self._inside]

@@ -124,7 +124,7 @@ def nodal_average(function: fem.Function, radius: Any = None, active: fem.Functi
     Args:
         function: vector function on a mesh.
         radius: radius of an axisymmetric body, a UFL expression; None in others.
-        active: function of one component that is 1 in the cells that count and 0 in the others; None where all do.
+        active: function that is 1 in the cells that count and 0 in the others; None where all do.
 
     Returns:
         Continuous, piecewise linear function; 0 at nodes of cells that do not count only.
@@ -134,7 +134,7 @@ def nodal_average(function: fem.Function, radius: Any = None, active: fem.Functi
     space = compat.function_space(domain, "Lagrange", 1, size)
     test = ufl.TestFunction(space)
     ones = fem.Constant(domain, np.ones(size))
-    there = 1.0 if active is None else active[0]
+    there = 1.0 if active is None else active
     sums = assembled(fem.form(weighted(there * ufl.inner(function, test), radius) * ufl.dx), space)
     weights = assembled(fem.form(weighted(there * ufl.inner(ones, test), radius) * ufl.dx), space)
     average = fem.Function(space, name=function.name)

@@ -21,11 +21,6 @@ class PointFunctions:
         """Accumulated deviatoric strain [-], as the particles have it, as a function that is constant in each cell."""
         return self.points.cell_function(self.points.deviatoric_strain, "deviatoric_strain", 0)
 
-    def active_function(self) -> fem.Function:
-        """Function that is 1 in the cells that are there and 0 in those that are inactive."""
-        there = np.repeat(self.points.material >= 0, self.points.per_cell).astype(float)
-        return self.points.cell_function(there, "active", 0)
-
     def material_function(self) -> fem.Function:
         """Position in `laws` of the law of each cell, as a function that is constant in each cell."""
         return self.points.cell_function(np.repeat(self.points.material, self.points.per_cell), "material", 0)

@@ -349,7 +349,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         if smooth and self.degree > 1:
             return self.points.cell_function(self.points.stress, "stress", 1)
         mean = self.points.cell_function(self.points.stress, "stress", 0)
-        return nodal_average(mean, self.radius, self.active_function()) if smooth else mean
+        return nodal_average(mean, self.radius, self._loads.active) if smooth else mean
 
     def evaluate_at(self, points: ArrayLike, smooth: bool = False) -> dict[str, NDArray[np.float64]]:
         """Values at points; the points and their cells may be on different ranks. Collective.
@@ -368,4 +368,4 @@ class QuasiStatic(SupportedBody, PointFunctions):
             InputError: a point is outside the body; the message names it. Raised on all ranks alike.
         """
         values = {"stress": self.stress_function(smooth), "state": self.state_function()}
-        return evaluate_at(points, self.active_function(), displacement=self.displacement, **values)
+        return evaluate_at(points, self._loads.active, displacement=self.displacement, **values)

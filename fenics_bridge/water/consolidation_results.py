@@ -14,6 +14,7 @@ from fenics_bridge import compat
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
 from fenics_bridge.fem.fields import SupportedBody, nodal_average, part_of
+from fenics_bridge.fem.loads import LoadVectors
 from fenics_bridge.fem.point_functions import PointFunctions
 from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.types import MeshTags, OfPosition
@@ -34,6 +35,7 @@ class ConsolidationResults(SupportedBody, PointFunctions):
     _laws: list[Any]
     _terms: WaterTerms
     _applied: AppliedBoundary
+    _loads: LoadVectors
     _soils: Any
     _displacements: Any
     _facet_tags: MeshTags
@@ -56,7 +58,7 @@ class ConsolidationResults(SupportedBody, PointFunctions):
             Effective stress [Pa], constant in each cell, the mean of its points, unless `smooth`.
         """
         mean = self.points.cell_function(self.points.stress, "effective_stress", 0)
-        return nodal_average(mean, self.radius, self.active_function()) if smooth else mean
+        return nodal_average(mean, self.radius, self._loads.active) if smooth else mean
 
     @property
     def laws(self) -> list[Any]:
@@ -78,7 +80,7 @@ class ConsolidationResults(SupportedBody, PointFunctions):
             InputError: a point is outside the body; the message names it. Raised on all ranks alike.
         """
         values = {"pressure": self.pressure, "stress": self.stress_function()}
-        return evaluate_at(points, self.active_function(), displacement=self.displacement, **values)
+        return evaluate_at(points, self._loads.active, displacement=self.displacement, **values)
 
     def pore_pressure(self, suction: bool = False, outside: OfPosition | None = None) -> OfPosition:
         """The pore pressure as a function of positions, for stages, collapse loads and factors of safety, as of `Seepage`.
