@@ -134,6 +134,13 @@ void slide(const Vector<D>& a, double longest, double by_radius, const Spring& s
   const Matrix<D> across = combined<D>(1, identity<D>(), -1, outer<D>(t, t));
   slip = combined<D>(longest / length, product<D>(across, slip), -by_radius, outer<D>(t, touch.normal));
 }
+
+/// Area of the surface that a particle covers [m2].
+template <int D>
+double area_at(const Spring& spring, const Vector<D>& normal)
+{
+  return spring.area + spring.by_normal * normal[0];
+}
 } // namespace
 
 template <int D>
@@ -198,7 +205,7 @@ bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring&
     place[i] = x[i] + u[i];
   const auto [apart, normal] = distance_at<D>(seen, end, place);
   touch.normal = normal;
-  touch.area = spring.area + spring.by_normal * normal[0];
+  touch.area = area_at<D>(spring, normal);
   const double overlap = (radius - apart) / spring.onset;
   if (overlap < -farthest)
     return false;
@@ -246,7 +253,7 @@ EndTouch<D> tied_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spr
   for (int i = 0; i < D; ++i)
     place[i] = x[i] + u[i];
   touch.normal = distance_at<D>(seen, end, place).normal;
-  touch.area = spring.area + spring.by_normal * touch.normal[0];
+  touch.area = area_at<D>(spring, touch.normal);
   for (int i = 0; i < D; ++i)
   {
     touch.arm[i] = place[i] - end.displacement[i] - end.centre[i];

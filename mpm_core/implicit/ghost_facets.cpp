@@ -66,6 +66,8 @@ std::vector<Index> hanging_cells(Model<G>& model, const MaterialPoints<G::dim>& 
   constexpr int D = G::dim;
   const VelocityField<G>& field = model.fields.front();
   std::vector<Index> hanging, supported;
+  if (lone.empty())
+    return hanging;
   for (const auto& support : field.supports)
     supported.push_back(support.node);
   std::ranges::sort(supported);
