@@ -10,7 +10,7 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._core import Geometry, InputError
+from ._core import InputError
 from .checks import positive, within
 from .collective import collectively
 from .collisions import add_collision
@@ -289,10 +289,9 @@ def require_outside(model: Model, surface: Surface, depth: float = 0.0) -> None:
 
 def require_new_soil_outside(model: Model) -> None:
     """Raise an InputError where soil was placed inside of a surface after that was added, before the first step. Collective."""
-    if model.steps > 0 or not model._contacts:
+    if model.steps > 0 or not model._seeded_late:
         return
-    size = model.particles.volume / (model.particles.position[:, 0] if model.geometry == Geometry.AXISYMMETRIC else 1)
-    radius = 0.5 * model.comm.allreduce(float(size.max(initial=0.0)), MPI.MAX) ** (1 / model.mesh.dim)
+    radius = 0.5 * model.comm.allreduce(float(model.particles._sides().max(initial=0.0)), MPI.MAX)
     for entry in model._contacts:
         if not entry["bonded"]:
             require_outside(model, surface_of(model, entry["surface"]), DEEPEST * radius)
@@ -321,9 +320,8 @@ def bonds_of(model: Model, surface: Surface) -> NDArray[np.float64]:
     Raises:
         InputError: there are none on any rank, or soil is inside.
     """
-    particles, dim = model.particles, model.mesh.dim
-    size = particles.volume / (particles.position[:, 0] if model.geometry == Geometry.AXISYMMETRIC else 1)
-    apart, radius = distances(surface, particles.position), 0.5 * size ** (1 / dim)
+    particles = model.particles
+    apart, radius = distances(surface, particles.position), 0.5 * particles._sides()
     depth = model.comm.allreduce(float(-apart.min(initial=0.0)), MPI.MAX)
     if depth > 0:
         raise InputError(f"surface {surface!r} has soil as deep as {depth:.6g} m inside, expected it outside")

@@ -105,6 +105,11 @@ class Particles:
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *(field["name"] for field in self.schedule())})
 
+    def _sides(self) -> NDArray[np.float64]:
+        """Side of the square or cube that is as large as each particle [m], twice its radius at surfaces; shape (n,)."""
+        size = self.volume / self.position[:, 0] if self._geometry == Geometry.AXISYMMETRIC else self.volume
+        return size ** (1 / self.position.shape[1])  # type: ignore[no-any-return]
+
     def single(self, *names: str) -> dict[str, NDArray[Any]]:
         """Copies of fields of all particles in single precision, such as frames that are kept in memory; faster than one by one.
 

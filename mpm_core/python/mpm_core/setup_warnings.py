@@ -40,9 +40,12 @@ def warn_of_setup(model: Model, nmd: bool) -> None:
 
 def _reversed_interfaces(model: Model) -> list[str]:
     """Of interfaces along planes, those that point from the second body to the first where these meet."""
+    planes = [entry for entry in model._field_contacts if entry["interface"]["kind"] == "Plane"]
+    if not planes:
+        return []
     p, mesh, found = model.particles, model.mesh, []
     field_of = np.array(model._velocity_fields)[p.material]
-    for entry in [one for one in model._field_contacts if one["interface"]["kind"] == "Plane"]:
+    for entry in planes:
         bodies = [field_of == entry[name] for name in ("first", "second")]
         nodes = np.intersect1d(*(mesh.cells[p.cell[body]] for body in bodies))
         near = np.isin(mesh.cells[p.cell], nodes).any(axis=1)

@@ -47,9 +47,7 @@ def load_surface(model: Body, surface: Surface, pressure: float | None, traction
         return float(floats("pressure", pressure, ())), np.zeros(dim)  # type: ignore[arg-type]
 
     normal_stress, vector = collectively(model.comm, wanted)
-    size = (particles.volume / (particles.position[:, 0] if model.geometry == Geometry.AXISYMMETRIC else 1)) ** (
-        1 / dim
-    )
+    size = particles._sides()
     finest = model.comm.allreduce(float(size.min(initial=np.inf)), MPI.MIN)
     if finest == np.inf:
         raise InputError("the model has no particles, seed some before a surface is loaded")
