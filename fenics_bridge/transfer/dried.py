@@ -71,7 +71,7 @@ def balance_dried_soil(
     offset = p.position - centres[cells]
     slope = search.values(cell_gradient(lost))
     wanted = search.values(lost)[:, 0] - np.einsum("pa,pa->p", slope, offset)  # at the centre
-    weight = water.unit_weight * p.porosity * (1 - p.saturation)
+    weight = STANDARD_GRAVITY * water.density * p.porosity * (1 - p.saturation)
     mass = p.mass.copy()
     mass[rows] -= (
         p.volume[rows] * _corrections(mesh, cells, p.volume, offset, weight, wanted, slope, rows) / STANDARD_GRAVITY

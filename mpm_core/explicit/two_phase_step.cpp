@@ -18,7 +18,7 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
 {
   PhaseClock clock(model.phase_seconds);
   const auto gravity = gravity_at(model, model.time);
-  const double density = model.water->unit_weight / standard_gravity;
+  const double density = model.water->density;
   const auto& mesh = model.mesh;
   NodeExchange& exchange = model.exchange;
   VelocityField<G>& soil = model.fields.front();
@@ -26,7 +26,7 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
 
   // Particles to nodes: masses (11), momenta, forces of effective stresses (14) and tractions (15); of pore pressures
   clock.begin(Phase::node_sums);
-  model.water->time = model.time;
+  stand_water(model, model.time, gravity);
   map_to_nodes(model);
   find_start_velocity(soil);
   find_start_velocity(water.motion);

@@ -61,8 +61,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   step.options = options;
   step.time = model.time;
   step.length = dt;
-  if (model.water)
-    model.water->time = model.time + dt;
+  stand_water(model, model.time + dt, gravity_at(model, model.time + dt));
   step.has_contacts = !model.contacts.empty();
   explicit_scheme::choose_forces(model, options.integration, averages_of(options));
   map_to_nodes(model); // (11), (15)

@@ -68,7 +68,7 @@ void try_drying(const Mesh<D>& mesh, const Particles<D>& particles, const std::v
                                     end,
                                     pressure_at<D>(standing, n)};
       Matrix<D> mobility{};
-      add<D>(step.dt * particles.conductivity[0][p] / water.unit_weight, anisotropy, mobility);
+      add<D>(step.dt * particles.conductivity[0][p] / laboratory_weight(water), anisotropy, mobility);
       add_particle<D>(particle, mobility, water.retention[static_cast<std::size_t>(run.material)], n,
                       pore.drying[static_cast<std::size_t>(run.cell)]);
     }

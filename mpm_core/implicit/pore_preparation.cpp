@@ -88,7 +88,7 @@ void add_particle(const Mesh<D>& mesh, const Particles<D>& particles, const Pore
   const auto [n, products] = mean_shapes(mesh.shapes[run.cell], moments, particles, p);
   const double volume = factor * particles.volume[p], pressure = particles.pore_pressure[0][p];
   const double storage = particles.porosity[0][p] / water.modulus;
-  const double mobility = particles.conductivity[0][p] / water.unit_weight;
+  const double mobility = particles.conductivity[0][p] / laboratory_weight(water);
   double stored = storage;
   if (dries)
     stored += particles.porosity[0][p] *
@@ -226,8 +226,8 @@ void hold_pressures(const Model<G>& model, NodeExchange& exchange, ImplicitStep<
     for (std::size_t i = 0; i < on_facet.size(); ++i)
       if (on_facet[i] > 0 && step.active[i])
       {
-        const double pressure = pressure_at(condition, mesh.points[i][D - 1], model.water->time);
-        if (model.water->may_dry() && condition.slope != 0 && pressure <= 0)
+        const double pressure = pressure_at(condition, *model.water, mesh.points[i][D - 1]);
+        if (model.water->may_dry() && condition.is_level && pressure <= 0)
           continue; // dry ground beside the water
         pore.held[i] = 1;
         pore.prescribed[i] = pressure;
@@ -297,7 +297,7 @@ void start_pore_water(Model<G>& model, ImplicitStep<G>& step)
   weigh_ghosts(nodes, step);
   pore.flows = true;
   pore.gravity = gravity_at(model, model.time + step.dt);
-  pore.density = model.water->unit_weight / standard_gravity;
+  pore.density = model.water->density;
   pore.unit = 0;
   for (const Law& law : model.laws)
     pore.unit = std::max(pore.unit, p_wave_modulus(law));

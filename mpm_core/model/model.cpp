@@ -239,6 +239,7 @@ void prepare(Model<G>& model)
   if (model.energy.stale)
     start_energy_balance(model);
 
+  stand_water(model, model.time, gravity_at(model, model.time));
   map_to_nodes(model); // what nodes are at the start may be looked at before a step
   for (VelocityField<G>& field : model.fields)
   {

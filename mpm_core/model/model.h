@@ -13,6 +13,7 @@
 #include "parallel/migration.h"
 #include "transfer/kinematics.h"
 
+#include <algorithm>
 #include <optional>
 
 namespace mpm::model
@@ -176,6 +177,16 @@ inline Vector<D> gravity_at(const Model<G>& model, double time)
     for (double& component : g)
       component *= time / model.gravity_ramp;
   return g;
+}
+
+/// Lets the water of a model stand as at a time and weigh as under a gravity [m/s2]; nothing without water.
+template <class G>
+inline void stand_water(Model<G>& model, double time, const Vector<G::dim>& gravity)
+{
+  if (!model.water)
+    return;
+  model.water->time = time;
+  model.water->gravity = std::max(0.0, -gravity[G::dim - 1]);
 }
 
 /// Sorts the particles, finds runs and moments, and gives nodes the sums and velocities at the start; needed after

@@ -76,7 +76,7 @@ double product_integral(int i, int j, const std::array<double, D>& r)
 
 /// Forces of a pressure on the facet of a cell opposite to vertex k.
 template <class G, int D = G::dim>
-void press(const Mesh<D>& mesh, const PressureCondition& condition, double time, Index cell, int k,
+void press(const Mesh<D>& mesh, const PressureCondition& condition, const PoreWater& water, Index cell, int k,
            Array<NodeSums<D>>& nodes)
 {
   const auto corners = facet_nodes<D>(mesh.cells[cell], k);
@@ -84,7 +84,7 @@ void press(const Mesh<D>& mesh, const PressureCondition& condition, double time,
   std::array<double, D> pressure, weight;
   for (int i = 0; i < D; ++i)
   {
-    pressure[i] = pressure_at(condition, mesh.points[corners[i]][D - 1], time);
+    pressure[i] = pressure_at(condition, water, mesh.points[corners[i]][D - 1]);
     weight[i] = thickness<G>(mesh.points[corners[i]]);
   }
   for (int i = 0; i < D; ++i)
@@ -106,7 +106,7 @@ void add_surface_pressures(const Mesh<G::dim>& mesh, const PoreWater& water, boo
     for (Index c = 0; c < mesh.owned_cells && condition.*acting; ++c)
       for (int k = 0; k <= G::dim && field.moments[c].volume > 0; ++k)
         if (mesh.facet_tags[c][k] == condition.facet_tag)
-          press<G>(mesh, condition, water.time, c, k, field.nodes);
+          press<G>(mesh, condition, water, c, k, field.nodes);
 }
 
 #define INSTANTIATE(G)                                                                                                 \

@@ -27,19 +27,19 @@ inline double value_at(const TimeTable& history, double time)
   return a + (b - a) * (time - t0) / (t1 - t0);
 }
 
-/// A pressure on tagged facets: value + slope x_D with the last coordinate; where it has a slope, at least zero.
+/// A pressure on tagged facets, or the level of water that stands against them.
 struct PressureCondition
 {
   Index facet_tag;
-  TimeTable value; ///< [Pa]
-  double slope;    ///< [Pa/m]
-  bool held;       ///< whether the pore water has this pressure at the nodes there
-  bool presses;    ///< whether this pressure loads the surface of the soil, as a total stress
+  TimeTable value; ///< pressure [Pa], or level along the last axis [m]
+  bool is_level;
+  bool held;    ///< whether the pore water has this pressure at the nodes there
+  bool presses; ///< whether this pressure loads the surface of the soil, as a total stress
 };
 
 struct PoreWater
 {
-  double unit_weight = 9810;  ///< gamma_w [N/m3]
+  double density = 1000;      ///< rho_w, of water without pressure [kg/m3]
   double modulus = 2.2e9;     ///< K_w [Pa], may be infinite
   bool kozeny_carman = false; ///< whether the conductivity follows the porosity n as n^3 / (1 - n)^2
   double suction_limit = std::numeric_limits<double>::infinity(); ///< below that pores are not full; explicit runs [Pa]
@@ -51,23 +51,32 @@ struct PoreWater
   TimeTable rain;                    ///< on the free surface above that water, per horizontal area [m/s]; likewise
   double inflow = 0;                 ///< water that has entered at the nodes of this rank since the start [m3]
   double time = 0;                   ///< for which loads and levels are wanted: the end of an implicit step [s]
+  double gravity = 0;                ///< downwards along the last axis, at that time [m/s2]
 
   bool may_dry() const { return !retention.empty(); }
 };
 
+/// Gravity under which conductivities are measured [m/s2].
+inline constexpr double laboratory_gravity = 9.81;
+
+/// Unit weight gamma_w of water where conductivities k are measured [N/m3]; k / gamma_w depends on no gravity.
+inline double laboratory_weight(const PoreWater& water) { return water.density * laboratory_gravity; }
+
+/// Pressure at a height, under water that stands up to a level [Pa].
+inline double pressure_below(const PoreWater& water, double level, double height)
+{
+  return std::max(0.0, water.density * water.gravity * (level - height));
+}
+
 /// Pressure of the water that stands over the soil, at a height [Pa].
 inline double standing_pressure(const PoreWater& water, double height)
 {
-  return water.standing.empty() ? 0.0
-                                : std::max(0.0, water.unit_weight * (value_at(water.standing, water.time) - height));
+  return water.standing.empty() ? 0.0 : pressure_below(water, value_at(water.standing, water.time), height);
 }
 
-/// Gravity by which the unit weight of water is its density [m/s2].
-inline constexpr double standard_gravity = 9.81;
-
-inline double pressure_at(const PressureCondition& condition, double height, double time)
+inline double pressure_at(const PressureCondition& condition, const PoreWater& water, double height)
 {
-  const double pressure = value_at(condition.value, time) + condition.slope * height;
-  return condition.slope == 0 || pressure > 0 ? pressure : 0;
+  const double value = value_at(condition.value, water.time);
+  return condition.is_level ? pressure_below(water, value, height) : value;
 }
 } // namespace mpm::model

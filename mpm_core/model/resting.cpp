@@ -43,8 +43,8 @@ double dry_mass(const Particles<D>& particles, const std::optional<PoreWater>& w
 {
   if (!water || !water->may_dry())
     return particles.mass[p];
-  return particles.mass[p] - water->unit_weight / standard_gravity * particles.saturation[0][p] *
-                                 particles.porosity[0][p] * particles.volume[p];
+  return particles.mass[p] -
+         water->density * particles.saturation[0][p] * particles.porosity[0][p] * particles.volume[p];
 }
 
 /// @throws InputError where the particles of a cell are not those of one call of `seed_cells`, or differ

@@ -16,7 +16,7 @@ namespace
 template <int D>
 double water_mass(const Particles<D>& particles, const PoreWater& water, Index p)
 {
-  const double density = water.unit_weight / standard_gravity * (1 + particles.pore_pressure[0][p] / water.modulus);
+  const double density = water.density * (1 + particles.pore_pressure[0][p] / water.modulus);
   return density * particles.porosity[0][p] * particles.volume[p];
 }
 
@@ -208,13 +208,13 @@ void water_to_nodes(const Mesh<G::dim>& mesh, NodeExchange& exchange, const Part
   {
     PoreMoments<D>& pores = field.cells[run.cell];
     const double before = pores.drag;
-    add_moments<G>(particles, water.unit_weight, run, mesh.shapes[run.cell], motion.moments[run.cell], pores);
+    add_moments<G>(particles, laboratory_weight(water), run, mesh.shapes[run.cell], motion.moments[run.cell], pores);
     resist(run, pores.drag - before);
   }
   for (const Run& run : soil.resting.runs)
   {
-    add_resting_moments<G>(particles, water.unit_weight, run.first, soil.moments[run.cell], motion.moments[run.cell],
-                           field.cells[run.cell]);
+    add_resting_moments<G>(particles, laboratory_weight(water), run.first, soil.moments[run.cell],
+                           motion.moments[run.cell], field.cells[run.cell]);
     resist(run, field.cells[run.cell].drag);
   }
   particles_to_nodes(mesh, exchange, particles, runs, motion);

@@ -71,7 +71,7 @@ bool change_water(Particles<D>& particles, const PoreWater& water, const Run& ru
   columns[pressure_at] = particles.pore_pressure[0].data();
   columns[porosity_at] = particles.porosity[0].data();
   columns[conductivity_at] = particles.conductivity[0].data();
-  const double density = water.unit_weight / standard_gravity, modulus = water.modulus, least = -water.suction_limit;
+  const double density = water.density, modulus = water.modulus, least = -water.suction_limit;
   const bool follows = water.kozeny_carman;
   LaneMask closed{};
   change_lanes<false>(columns, run.first, run.last,
@@ -129,7 +129,7 @@ std::array<double, 2> water_pass(Model<G>& model, double dt, double flip_fractio
 {
   constexpr int D = G::dim;
   Particles<D>& particles = model.particles;
-  const double density = model.water->unit_weight / standard_gravity;
+  const double density = model.water->density;
   std::array<double, 2> work{};
   const auto change_run = [&](const Run& run)
   {

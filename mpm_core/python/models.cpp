@@ -234,6 +234,7 @@ void bind_model(py::module_& m, const std::string& suffix)
            {
              prepare(model);
              choose_forces(model, integration, nmd ? Averages::of_steps : Averages::none);
+             stand_water(model, model.time, gravity);
              map_to_nodes(model);
              return out_of_balance(model, gravity);
            })

@@ -36,15 +36,15 @@ void bind_pore_water(py::module_& m)
   using Curves = std::array<std::vector<double>, model::Retention::n_curves>;
   using OneRetention = std::tuple<std::vector<double>, Curves, Curves>;
   m.def("fast_wave_squared", &fast_wave_squared);
+  m.attr("laboratory_gravity") = model::laboratory_gravity;
   py::class_<PoreWater>(m, "PoreWater")
       .def(py::init<>())
-      .def_readwrite("unit_weight", &PoreWater::unit_weight)
+      .def_readwrite("density", &PoreWater::density)
       .def_readwrite("modulus", &PoreWater::modulus)
       .def_readwrite("kozeny_carman", &PoreWater::kozeny_carman)
       .def_readwrite("suction_limit", &PoreWater::suction_limit)
       .def_readwrite("drained_surface", &PoreWater::drained_surface)
       .def_readwrite("inflow", &PoreWater::inflow)
-      .def_readwrite("time", &PoreWater::time)
       .def_readwrite("anisotropy", &PoreWater::anisotropy)
       .def_readwrite("standing", &PoreWater::standing)
       .def_readwrite("rain", &PoreWater::rain)
@@ -73,11 +73,11 @@ void bind_pore_water(py::module_& m)
              return pressure;
            })
       .def("set_conditions",
-           [](PoreWater& water, const std::vector<std::tuple<Index, TimeTable, double, bool, bool>>& conditions)
+           [](PoreWater& water, const std::vector<std::tuple<Index, TimeTable, bool, bool, bool>>& conditions)
            {
              water.conditions.clear();
-             for (const auto& [tag, value, slope, held, presses] : conditions)
-               water.conditions.push_back({tag, value, slope, held, presses});
+             for (const auto& [tag, value, is_level, held, presses] : conditions)
+               water.conditions.push_back({tag, value, is_level, held, presses});
            });
 }
 

@@ -19,7 +19,6 @@ import mpm_core as mpm
 from fenics_bridge.transfer.particle_forces import seepage_forces
 from fenics_bridge.water import Reservoir
 from fenics_bridge.water.boundary import value_at
-from fenics_bridge.water.soils import WATER_WEIGHT
 from particle_player import Movie
 
 from .figures import Pictures
@@ -101,7 +100,6 @@ def let_water_flow(slope: SlopeSite, instant: Instant, model: mpm.Model) -> None
         porosity={name: soil.porosity for name, soil in soils.items()},
         conductivity={name: vertical_conductivity(soil) for name, soil in soils.items()},
         anisotropy=directions and 2 * directions,  # `handed_over` has two laws for each soil
-        unit_weight=WATER_WEIGHT,
         drained_surface=True,
     )
     model.set_pore_pressure(lambda points: np.maximum(instant.pore_pressure(points), 0.0))

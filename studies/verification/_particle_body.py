@@ -22,7 +22,7 @@ class ParticleBody:
 
     def __init__(self, mesh, supports, drained, load, law, mobility, length, geometry=None, weight=1e-3, nmd=False):
         """mesh, supports, load: as for `water.Consolidation`; drained: tags; mobility: k / gamma_w [m2/(Pa s)]
-        weight: of the pore water [N/m3]; nmd: average volumetric strains over nodes
+        weight: of the pore water under 9.81 m/s2 [N/m3]; nmd: average volumetric strains over nodes
         """
         domain, _, facet_tags = mesh
         self.law, self.period = law, length**2 / (mobility * law.p_wave_modulus)
@@ -30,7 +30,7 @@ class ParticleBody:
         self.model.seed(density=2000.0, per_cell=3)
         bridge.apply_supports(self.model, [support for support in supports if not any(support.displacement or ())])
         self._plates = {s.facet_tag: s.displacement for s in supports if any(s.displacement or ())}
-        self.model.add_water(porosity=0.4, conductivity=mobility * weight, modulus=np.inf, unit_weight=weight)
+        self.model.add_water(porosity=0.4, conductivity=mobility * weight, modulus=np.inf, density=weight / 9.81)
         self.drain(drained)
         self._motion = (lambda time: load(time).displacement) if callable(load) else lambda time: 0.0
         for tag, pressure in ({} if callable(load) else load.pressure).items():

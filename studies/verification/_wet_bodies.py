@@ -72,7 +72,7 @@ class WetParticles:
         self.model.seed(density=weight / GRAVITY, per_cell=3)
         bridge.apply_supports(self.model, supports)
         self.model.set_gravity((0.0, -GRAVITY))
-        self.model.add_water(porosity=POROSITY, conductivity=conductivity, unit_weight=WATER, modulus=modulus)
+        self.model.add_water(porosity=POROSITY, conductivity=conductivity, modulus=modulus)
         if pressure is not None:
             self.model.set_pore_pressure(pressure)
         for tag, level in levels.items():

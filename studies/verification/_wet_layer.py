@@ -24,7 +24,7 @@ def large_layer(cells, ratio, per_cell=12):
     model.roller(1, (1, 0))
     model.roller(2, (1, 0))
     model.fix(3)
-    model.add_water(porosity=0.6, conductivity=CONDUCTIVITY, modulus=np.inf, unit_weight=WEIGHT, drained_surface=True)
+    model.add_water(porosity=0.6, conductivity=CONDUCTIVITY, modulus=np.inf, drained_surface=True)
     model.add_field("initial_volume", unit="m3", meaning="Volume at the beginning")
     model.particles.set("initial_volume", model.particles.volume)
     y = model.particles.position[:, 1]

@@ -129,7 +129,6 @@ def particles(cells, law, porosity, conductivity, curve, weight, air=0):
         porosity=porosity,
         conductivity=conductivity,
         modulus=np.inf,
-        unit_weight=WATER,
         retention=curve,
         drained_surface=air > 0,
     )

@@ -141,10 +141,14 @@ _FIELD_CONTACT = {
     "first": _is_count, "second": _is_count, "friction": _is_number, "adhesion": _is_number, "interface": _is_surface
 }  # fmt: skip
 _WATER = {
-    "unit_weight": _is_number, "modulus": str, "suction_limit": str,  # texts, as they may be infinite
+    "density": _is_number, "modulus": str, "suction_limit": str,  # texts, as they may be infinite
     "kozeny_carman": bool, "drained_surface": bool, "standing": [_PAIR], "rain": [_PAIR], "retention": [[[_is_number]]],
     "anisotropy": [((_is_number,) * 3,) * 3],
-    "conditions": [(_is_tag, [_PAIR], _is_number, bool, bool)],
+    "conditions": [(_is_tag, [_PAIR], bool, bool, bool)],
+}  # fmt: skip
+_OLD_WATER = {
+    **{name: shape for name, shape in _WATER.items() if name != "density"},
+    "unit_weight": _is_number, "conditions": [(_is_tag, [_PAIR], _is_number, bool, bool)],
 }  # fmt: skip
 _CONTROL = {"longest": _is_above_zero, "length": _is_above_zero, "iterations": _is_positive, "cuts": _is_positive}
 
@@ -165,7 +169,7 @@ _ENTRIES: dict[str, tuple[Any, str]] = {
     "contacts": ([_CONTACT], "a list of contacts with rigid surfaces"),
     "field_contacts": ([_FIELD_CONTACT], "a list of contacts between velocity fields"),
     "far_field": (AnyOf([_NONE, _is_border]), "null, or forces and displacements of its border"),
-    "water": (AnyOf([_NONE, _WATER]), "null, or the properties of the pore water"),
+    "water": (AnyOf([_NONE, _WATER, _OLD_WATER]), "null, or the properties of the pore water"),
     "geometry": (set(Geometry.__members__), f"one of {', '.join(Geometry.__members__)}"),
     "velocity_fields": ([_is_count], "a list of whole numbers from 0 on"),
     "collisions": (

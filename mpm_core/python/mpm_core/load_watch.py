@@ -30,13 +30,13 @@ class LoadWatch:
         model, mesh, owned = self._model, self._model.mesh, self._model.mesh.owned_cells
         tags = np.asarray(mesh._core.facet_tags)[:owned]  # of the facet that is opposite to each node of a cell
         self._loaded = []
-        for tag, history, slope, _, presses in model._water_conditions:
+        for tag, history, is_level, _, presses in model._water_conditions:
             if not presses:
                 continue
             cells, opposite = np.nonzero(tags == tag)
             of_cell = mesh.points[mesh.cells[cells], -1]
             height = (of_cell.sum(axis=1) - of_cell[np.arange(len(cells)), opposite]) / mesh.dim
-            self._loaded.append((tag, history, slope, cells, height))
+            self._loaded.append((tag, history, is_level, cells, height))
         self._mesh, self._before = mesh, self._filled()
 
     def _filled(self) -> NDArray[np.bool_]:
@@ -54,9 +54,9 @@ class LoadWatch:
             self._begin()
             return
         left = self._before & ~self._filled()
-        for tag, history, slope, cells, height in self._loaded:
-            pressure = np.interp(model.time, *np.transpose(history)) + slope * height
-            pressed = pressure > 0 if slope else pressure != 0
+        for tag, history, is_level, cells, height in self._loaded:
+            value = np.interp(model.time, *np.transpose(history))
+            pressed = height < value if is_level else value != 0
             lost[tag] = model.comm.allreduce(int(np.count_nonzero(left[cells] & pressed)))
         tags = [tag for tag, count in lost.items() if count]
         if not tags:

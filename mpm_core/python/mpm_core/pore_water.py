@@ -19,14 +19,14 @@ from .mesh import Tag, floats
 from .parameter_fields import Field
 from .particles import Particles
 from .retention import curves_of_laws, joined
-from .setup_warnings import warn_of_water_weight
-from .water_checks import STANDARD_GRAVITY, require_pores, require_soil, require_standard_gravity
+from .setup_warnings import warn_of_water_density
+from .water_checks import density_of_water, require_pores, require_soil
 
 History: TypeAlias = list[tuple[float, float]]
 """Pairs of time [s] and value, of rising times, joined by straight lines; one pair for a value that stays"""
 
-WaterCondition: TypeAlias = tuple[int, History, float, bool, bool]
-"""Facet tag; pressure at height 0 [Pa] over time and its increase with height [Pa/m]; whether the pore water has it; whether it
+WaterCondition: TypeAlias = tuple[int, History, bool, bool, bool]
+"""Facet tag; pressure [Pa] or level [m] over time; whether it is a level; whether the pore water has that pressure; whether it
 presses on the soil"""
 
 Value: TypeAlias = float | Sequence[tuple[float, float]]
@@ -56,13 +56,14 @@ class PoreWater(Conditions):
         *,
         porosity: Field,
         conductivity: Field,
-        unit_weight: float = 9810.0,
+        density: float = 1000.0,
         modulus: float = 2.2e9,
         kozeny_carman: bool = False,
         suction_limit: float = np.inf,
         drained_surface: bool = False,
         retention: Any = None,
         anisotropy: Any = None,
+        unit_weight: float | None = None,
     ) -> None:
         """Fill the pores of all particles with water, which from then on flows in implicit and explicit steps.
 
@@ -71,10 +72,11 @@ class PoreWater(Conditions):
 
         Args:
             porosity: volume of the pores over that of the soil [-], in (0, 1); it follows the volume of the particles.
-            conductivity: hydraulic conductivity k [m/s], positive. Both: a number; an array, shape (n,), in the order of
-                ``particles``; a function of positions, shape (n, D); or {cell tag or name: number}.
-            unit_weight: of water [N/m3] under a gravity of 9.81 m/s2, which gives its density; water that stands up to a level
-                needs that gravity.
+            conductivity: hydraulic conductivity k [m/s], positive, as measured in a laboratory under 9.81 m/s2, whatever the
+                gravity of the model: under n times that gravity water flows n times as fast by its own weight. Both: a number;
+                an array, shape (n,), in the order of ``particles``; a function of positions, shape (n, D); or {cell tag or
+                name: number}.
+            density: of water without pressure [kg/m3]. Water that stands up to a level weighs density times gravity.
             modulus: bulk modulus of water [Pa]; may be infinite.
             kozeny_carman: let the conductivity follow the porosity as n^3 / (1 - n)^2.
             suction_limit: largest suction of the water [Pa], 0 or more, in explicit runs: where soil grows beyond it, its pores
@@ -89,6 +91,7 @@ class PoreWater(Conditions):
             anisotropy: conductivities along the axes over ``conductivity``, (D,), positive, or their tensor, (D, D), symmetric
                 with positive principal values, of strata that dip for instance (`fenics_bridge.water.dipping`); or a list with
                 one for each law (None for 1 in all directions). Axes are fixed in space.
+            unit_weight: old way to give the density, which is ``unit_weight`` / 9.81 m/s2; for one version more.
 
         Raises:
             InputError: on all ranks, for values out of these ranges, or a model without particles.
@@ -96,7 +99,7 @@ class PoreWater(Conditions):
 
         def checked() -> tuple[Any, NDArray, NDArray]:
             water = _core.PoreWater()
-            water.unit_weight = positive("unit_weight", unit_weight, "N/m3")
+            water.density = density_of_water(density, unit_weight)
             if not modulus > 0:
                 raise InputError(f"modulus is {modulus} Pa, expected a positive number, or infinity")
             water.modulus, water.kozeny_carman = float(modulus), bool(kozeny_carman)
@@ -117,7 +120,7 @@ class PoreWater(Conditions):
         if self.comm.allreduce(len(self.particles)) == 0:
             raise InputError("the model has no particles, expected them before add_water()")
         water, n, k = collectively(self.comm, checked)
-        warn_of_water_weight(self.comm, water.unit_weight)
+        warn_of_water_density(self.comm, water.density)
         self._core.water = water
         self.particles.set("porosity", n)
         self.particles.set("conductivity", k)
@@ -141,7 +144,7 @@ class PoreWater(Conditions):
         self._require_water()
         p, water = self.particles, self._core.water
         n, volume = p.porosity, p.volume
-        density, of_water = p.mass / volume, n * water.unit_weight / STANDARD_GRAVITY
+        density, of_water = p.mass / volume, n * water.density
         if self._core.has_two_phases:
             density = density + p.water_mass / volume
         modulus = self.wave_moduli()[:, 0]
@@ -220,7 +223,7 @@ class PoreWater(Conditions):
         if not water.may_dry:
             return
         after = np.asarray(water.saturation(p.material, p.pore_pressure), dtype=float)
-        pores = water.unit_weight / STANDARD_GRAVITY * p.porosity * p.volume
+        pores = water.density * p.porosity * p.volume
         p.set("mass", p.mass + pores * (after - p.saturation))
         p.set("saturation", after)
 
@@ -275,8 +278,9 @@ class PoreWater(Conditions):
         Args:
             facet_tag: by number or name.
             pressure: [Pa], the same at all nodes; 0 where water leaves freely.
-            level: height of standing water [m] along the last axis instead: hydrostatic pressure below it, zero above; where
-                soil may dry the facets above it are impervious. Both may be tables, ((time [s], value), ...).
+            level: height of standing water [m] along the last axis instead: below it the pressure of water with the density of
+                the pore water, under the gravity along that axis; zero above, where soil that may dry is impervious. Both may be
+                tables, ((time [s], value), ...).
             presses: whether this pressure also loads the surface of the soil, as a total stress, which standing water does; by
                 default with ``level``.
 
@@ -286,22 +290,16 @@ class PoreWater(Conditions):
         """
         self._require_water()
 
-        def checked() -> tuple[tuple[int, ...], History, float, bool]:
+        def checked() -> tuple[tuple[int, ...], History, bool]:
             if (pressure is None) == (level is None):
                 raise InputError(f"pressure is {pressure} and level is {level}, expected one of them")
             tags = self.mesh.tags_of("facet", facet_tag)
-            if pressure is not None:
-                return tags, history_of("pressure", pressure), 0.0, bool(presses)
-            weight, heights = self._core.water.unit_weight, history_of("level", 0.0 if level is None else level)
-            return (
-                tags,
-                [(time, weight * height) for time, height in heights],
-                -weight,
-                presses is None or bool(presses),
-            )
+            if level is not None:
+                return tags, history_of("level", level), presses is None or bool(presses)
+            return tags, history_of("pressure", 0.0 if pressure is None else pressure), bool(presses)
 
-        tags, value, slope, loads = collectively(self.comm, checked)
-        self._replace(tags, True, (value, slope, True, loads))
+        tags, value, loads = collectively(self.comm, checked)
+        self._replace(tags, True, (value, level is not None, True, loads))
 
     def press_surface(self, facet_tag: Tag, pressure: float) -> None:
         """Load the soil at facets with a tag by a pressure, as a total stress at their nodes. A further call changes it.
@@ -319,9 +317,9 @@ class PoreWater(Conditions):
         tags, value = collectively(
             self.comm, lambda: (self.mesh.tags_of("facet", facet_tag), float(floats("pressure", pressure, ())))
         )
-        self._replace(tags, False, ([(0.0, value)], 0.0, False, True))
+        self._replace(tags, False, ([(0.0, value)], False, False, True))
 
-    def _replace(self, tags: tuple[int, ...], held: bool, values: tuple[History, float, bool, bool]) -> None:
+    def _replace(self, tags: tuple[int, ...], held: bool, values: tuple[History, bool, bool, bool]) -> None:
         """Replace the conditions at facets with these tags, of the pore water or of loads."""
         kept = [one for one in self._water_conditions if one[0] not in tags or one[3] != held]
         self._set_water_conditions([*kept, *((tag, *values) for tag in tags)])
@@ -359,7 +357,6 @@ class PoreWater(Conditions):
     def _set_water_conditions(self, conditions: list[WaterCondition]) -> None:
         water = self._core.water
         water.set_conditions(conditions)
-        water.time = self._core.time
         self._core.water, self._water_conditions = water, conditions
 
     def _set_retention(self, water: Any, curves: list[list[NDArray[np.float64]]]) -> None:
@@ -371,10 +368,9 @@ class PoreWater(Conditions):
             raise InputError("the model has no pore water, expected add_water() before")
 
     def _check_water(self) -> None:
-        """Refuse particles without pores, such as those seeded after `add_water`, or too light, and another gravity. Collective."""
+        """Refuse particles without pores, such as those seeded after `add_water`, or too light. Collective."""
         if self._core.water is not None:
             collectively(self.comm, lambda: require_soil(self))
-            require_standard_gravity(self)
 
 
 def history_of(name: str, value: Value, least: float = -np.inf) -> History:

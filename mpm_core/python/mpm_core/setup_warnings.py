@@ -18,11 +18,17 @@ UNIT_WEIGHTS = (1e3, 150e3)
 """Bounds of the unit weight of a soil [N/m3]: peat has 10 kN/m3, published slopes have up to 80, and 16 kN/m3 taken for a density
 gives 157"""
 
+ON_EARTH = 10.0
+"""Gravity [m/s2] by which soils have these unit weights; that of a centrifuge may be any number of times as large"""
+
 RADIANS = (0.1, 1.57)
 """Friction angles [degrees] that are more probably angles in radians, of soils from 6 to 90 degrees"""
 
 STEEPEST_FRICTION = 2.0
 """Coefficient of friction, of an angle of 63 degrees, above which it is more probably an angle"""
+
+ODD_WATER = (0.1, 200.0, 5000.0)
+"""Densities [kg/m3] between the first two and above the last are probably those of water in other units, or under another gravity"""
 
 NEARLY_INCOMPRESSIBLE = 0.45
 """Poisson's ratio above which linear cells lock"""
@@ -84,7 +90,7 @@ def _nothing_holds(model: Model) -> str:
 
 
 def _weight(model: Model) -> str:
-    p, gravity = model.particles, float(np.linalg.norm(model.gravity))
+    p, gravity = model.particles, min(float(np.linalg.norm(model.gravity)), ON_EARTH)
     densities = p.mass / p.volume
     low = model.comm.allreduce(float(densities.min(initial=np.inf)), MPI.MIN) * gravity
     high = model.comm.allreduce(float(densities.max(initial=0.0)), MPI.MAX) * gravity
@@ -92,7 +98,7 @@ def _weight(model: Model) -> str:
     if gravity == 0 or (low >= UNIT_WEIGHTS[0] and high <= UNIT_WEIGHTS[1]):
         return ""
     return (
-        f"the unit weight of particles is {odd:.4g} N/m3, density times gravity, expected from {UNIT_WEIGHTS[0]:g} to "
+        f"the unit weight of particles is {odd:.4g} N/m3, density times {gravity:g} m/s2, expected from {UNIT_WEIGHTS[0]:g} to "
         f"{UNIT_WEIGHTS[1]:g} N/m3 for a soil: densities are in kg/m3, 2000 for most soils"
     )
 
@@ -151,6 +157,17 @@ def warn_of_water_weight(comm: MPI.Comm, unit_weight: float) -> None:
             f"the unit weight of water is {unit_weight:g} N/m3; unit weights are in N/m3, 9810 for water",
             RuntimeWarning,
             stacklevel=3,
+        )
+
+
+def warn_of_water_density(comm: MPI.Comm, density: float, stacklevel: int = 3) -> None:
+    """Warn of a density of water in other units, or found by another gravity; one of nearly zero is fine. Not collective."""
+    if comm.rank == 0 and not (density < ODD_WATER[0] or ODD_WATER[1] < density < ODD_WATER[2]):
+        warnings.warn(
+            f"the density of water is {density:g} kg/m3, expected some 1000; densities are in kg/m3, unit weights in N/m3 under the "
+            "gravity of the model",
+            RuntimeWarning,
+            stacklevel=stacklevel,
         )
 
 

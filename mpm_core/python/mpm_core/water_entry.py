@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _core
+from .water_checks import LABORATORY_GRAVITY
 
 if TYPE_CHECKING:
     from .model import Model
 
-_WATER = ("unit_weight", "modulus", "suction_limit", "kozeny_carman", "drained_surface")
+_WATER = ("density", "modulus", "suction_limit", "kozeny_carman", "drained_surface")
 
 _MAY_BE_INFINITE = ("modulus", "suction_limit")
 
@@ -42,6 +43,7 @@ def take_water(model: Model, entry: dict[str, Any] | None) -> None:
     model._core.water, model._water_conditions, model._retention = None, [], []
     if entry is None:
         return
+    entry = _present_entry(entry)
     water = _core.PoreWater()
     for name in _WATER:
         setattr(water, name, float(entry[name]) if name in _MAY_BE_INFINITE else entry[name])
@@ -52,7 +54,21 @@ def take_water(model: Model, entry: dict[str, Any] | None) -> None:
     model._core.water = water
     model._set_water_conditions(
         [
-            (tag, [(time, number) for time, number in value], slope, held, loads)
-            for tag, value, slope, held, loads in entry["conditions"]
+            (tag, [(time, number) for time, number in value], is_level, held, loads)
+            for tag, value, is_level, held, loads in entry["conditions"]
         ]
     )
+
+
+def _present_entry(entry: dict[str, Any]) -> dict[str, Any]:
+    """An entry as it is written now; before, it had the unit weight under 9.81 m/s2, and levels as pressures that fall with height."""
+    if "density" in entry:
+        return entry
+    return {
+        **entry,
+        "density": entry["unit_weight"] / LABORATORY_GRAVITY,
+        "conditions": [
+            [tag, [[time, number / -slope if slope else number] for time, number in value], slope != 0, held, loads]
+            for tag, value, slope, held, loads in entry["conditions"]
+        ],
+    }

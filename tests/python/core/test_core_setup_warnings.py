@@ -72,11 +72,16 @@ def test_an_angle_in_place_of_a_coefficient_of_friction_is_said():
         model_of().add_contact(ground, friction=1.0)
 
 
-def test_a_unit_weight_of_water_in_kilonewtons_is_said():
-    with pytest.warns(
-        RuntimeWarning, match="unit weight of water is 9.81 N/m3; unit weights are in N/m3, 9810 for water"
-    ):
-        model_of().add_water(porosity=0.4, conductivity=1e-5, unit_weight=9.81)
+@pytest.mark.parametrize("density", [1.0, 9810.0])
+def test_a_density_of_water_in_other_units_is_said(density):
+    with pytest.warns(RuntimeWarning, match=f"the density of water is {density:g} kg/m3, expected some 1000"):
+        model_of().add_water(porosity=0.4, conductivity=1e-5, density=density)
+
+
+def test_soil_in_a_centrifuge_has_a_usual_density():
+    assert said(model_of(gravity=490.5, law=mpm.LinearElastic(young=100e6, poisson=0.3))) == []
+    (one,) = said(model_of(gravity=490.5, density=18e3, law=mpm.LinearElastic(young=100e6, poisson=0.3)))
+    assert "unit weight of particles is 1.8e+05 N/m3, density times 10 m/s2" in one
 
 
 @pytest.mark.parametrize(
