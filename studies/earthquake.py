@@ -31,7 +31,7 @@ from common.earthquake_site import (
 from common.figures import Pictures
 from common.followed import FollowedNodes, cells_near, mean_displacement, numbers_in
 from common.history import History
-from common.motions import noise_band, ricker
+from common.motions import accelerations, noise_band, ricker
 from common.movie import gathered, own_frame, particle_movie
 from common.newmark import sliding_block, yield_acceleration
 from common.options import add_choice, add_count, add_number, check, study_parser
@@ -243,8 +243,8 @@ def drawn(a: Namespace, folder: Path, record: tuple, history: History, slips: di
     if scene is None:
         return {}
     time, last = history["time_s"], frames[-1]
-    accelerations = {
-        name: (time, np.gradient(history[column], time))
+    shaking = {
+        name: accelerations(time, history[column])
         for name, column in (
             ("crest", "crest_velocity_m_per_s"),
             ("free field at its level", "crest_level_velocity_m_per_s"),
@@ -256,7 +256,7 @@ def drawn(a: Namespace, folder: Path, record: tuple, history: History, slips: di
     }
     pictures = {
         "record": partial(save_record, folder / "record.png", record[0], record[1], record[2].velocity),
-        "motions": partial(save_motions, folder / "motions.png", accelerations, displacements),
+        "motions": partial(save_motions, folder / "motions.png", shaking, displacements),
         "amplification": partial(save_amplification, folder / "amplification.png", *ratios),
         "displacement": partial(save_ground, folder / "displacement.png", last, "displacement", DISPLACEMENT),
         "shear_strain": partial(save_ground, folder / "shear_strain.png", last, "shear_strain", SHEAR_STRAIN),
@@ -288,8 +288,8 @@ def main(arguments: list[str] | None = None) -> int:
         "factor_of_safety": static_safety(a),
         "slope_displacement_m": slope_slip(history)[-1],
         **{f"newmark_displacement_m_{level}": slip[-1] for level, slip in slips.items()},
-        "largest_acceleration_of_outcrop_m_per_s2": np.abs(np.gradient(record[2].velocity, record[2].time)).max(),
-        "largest_acceleration_of_crest_m_per_s2": np.abs(np.gradient(history["crest_velocity_m_per_s"], history["time_s"])).max(),
+        "largest_acceleration_of_outcrop_m_per_s2": np.abs(accelerations(record[2].time, record[2].velocity)[1]).max(),
+        "largest_acceleration_of_crest_m_per_s2": np.abs(accelerations(history["time_s"], history["crest_velocity_m_per_s"])[1]).max(),
         "largest_amplification_in_closed_form": exact[1].max(),
         "largest_error_of_linear_amplification": np.abs(linear / exact[1] - 1).max(),
         "converted_fraction": report.converted_cells / (report.converted_cells + report.resting_cells),

@@ -11,6 +11,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 
 from .figures import curve_figure, save_figure
+from .motions import accelerations
 from .plots import CURVES, WIDTH, Quantity, colour_limits, discs, draw_bar, paper_style
 
 Curve = tuple[np.ndarray, np.ndarray]
@@ -31,14 +32,14 @@ def save_record(path: Path, time: np.ndarray, acceleration: np.ndarray, velocity
     """
     raw = _integral(time, acceleration)
     rows = (
-        ("Acceleration [m/s²]", acceleration, np.gradient(velocity, time)),
-        ("Velocity [m/s]", raw, velocity),
-        ("Displacement [m]", _integral(time, raw), _integral(time, velocity)),
+        ("Acceleration [m/s²]", (time, acceleration), accelerations(time, velocity)),
+        ("Velocity [m/s]", (time, raw), (time, velocity)),
+        ("Displacement [m]", (time, _integral(time, raw)), (time, _integral(time, velocity))),
     )
     with curve_figure(path, (WIDTH, 4.6), rows=3) as axes:
         for panel, (label, before, after) in zip(axes, rows):
-            panel.plot(time, before, color="#b0b0b0", linewidth=1.0, label="before baseline correction")
-            panel.plot(time, after, color=CURVES[0], linewidth=0.9, label="after baseline correction")
+            panel.plot(*before, color="#b0b0b0", linewidth=1.0, label="before baseline correction")
+            panel.plot(*after, color=CURVES[0], linewidth=0.9, label="after baseline correction")
             panel.set(ylabel=label, xmargin=0)
         axes[0].legend(ncols=2, loc="upper right", fontsize=8)
         axes[-1].set_xlabel("Time [s]")

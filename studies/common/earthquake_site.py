@@ -27,9 +27,8 @@ STEP = 0.01
 def outcrop_motion(a: Namespace) -> tuple[np.ndarray, np.ndarray, mpm.Motion]:
     """Times [s], accelerations [m/s2] as given, and the motion of the rock's outcrop after the baseline correction."""
     if a.accelerogram is not None:
-        raw = recorded(a)
-        return raw.time, np.gradient(raw.velocity, raw.time), as_motion(raw.time, np.gradient(raw.velocity, raw.time))
-    if a.motion == "ricker":
+        time, acceleration = recorded(a)
+    elif a.motion == "ricker":
         time, acceleration = ricker(a.frequency, a.peak, a.duration, STEP)
     else:
         time, acceleration = band_limited_noise(
@@ -38,13 +37,13 @@ def outcrop_motion(a: Namespace) -> tuple[np.ndarray, np.ndarray, mpm.Motion]:
     return time, acceleration, as_motion(time, acceleration)
 
 
-def recorded(a: Namespace) -> mpm.Motion:
-    """The motion in the file of ``--accelerogram``."""
+def recorded(a: Namespace) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and accelerations [m/s2] in the file of ``--accelerogram``."""
     path = a.accelerogram
     if not any(line.split("#")[0].strip() for line in path.read_text(errors="replace").splitlines()):
         raise mpm.InputError(f"--accelerogram {path} is empty")
     try:
-        return mpm.read_accelerogram(path, unit=a.unit, baseline=None)
+        return mpm.read_acceleration(path, unit=a.unit)
     except mpm.InputError as error:
         raise mpm.InputError(
             f"--accelerogram: expected two columns: time [s], acceleration [{a.unit}]; {error}"

@@ -63,3 +63,12 @@ def as_motion(time: np.ndarray, acceleration: np.ndarray) -> mpm.Motion:
     span = time[-1] - time[0]
     fade = np.clip((time[-1] - time) / (0.1 * span), 0.0, 1.0)
     return mpm.Motion(time, motion.velocity * 0.5 * (1 - np.cos(np.pi * fade)))
+
+
+def accelerations(time: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Middles of the intervals between times [s], and the acceleration in each of them [m/s2], (n - 1) each.
+
+    The velocity of a motion is linear between its samples, so that its acceleration is constant there. A gradient at the samples
+    would be the mean over two intervals, which lowers peaks: by 10 % at 5 Hz with steps of 0.02 s.
+    """
+    return 0.5 * (time[1:] + time[:-1]), np.diff(velocity) / np.diff(time)

@@ -42,7 +42,7 @@ from .law_parameters import signature_of
 from .laws import log_preconsolidation, matched_drucker_prager, tresca, von_mises
 from .mesh import Mesh
 from .model import Model
-from .motion import Motion, motion_of_acceleration, read_accelerogram
+from .motion import Motion, motion_of_acceleration, read_acceleration, read_accelerogram
 from .newton import Newton
 from .parameter_fields import RandomField
 from .particles import Particles
@@ -120,6 +120,7 @@ __all__ = [
     "matched_drucker_prager",
     "motion_of_acceleration",
     "parts",
+    "read_acceleration",
     "read_accelerogram",
     "space",
     "tresca",

@@ -64,12 +64,25 @@ def motion_of_acceleration(time: ArrayLike, acceleration: ArrayLike, *, baseline
 
 
 def read_accelerogram(path: str | os.PathLike[str], *, unit: str, baseline: int | None = 1) -> Motion:
-    """The motion of a file with two columns, time [s] and acceleration, divided by blanks or commas; ``#`` begins a comment.
+    """The motion of a file of `read_acceleration`.
 
     Args:
         path: of the file; all ranks read it.
         unit: of the acceleration, ``"m/s2"``, ``"cm/s2"`` or ``"g"``.
         baseline: as for `motion_of_acceleration`.
+
+    Raises:
+        InputError: as `read_acceleration` and `motion_of_acceleration`.
+    """
+    return motion_of_acceleration(*read_acceleration(path, unit=unit), baseline=baseline)
+
+
+def read_acceleration(path: str | os.PathLike[str], *, unit: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times [s] and accelerations [m/s2], (n,) each, of a file with these two columns, divided by blanks or commas.
+
+    Args:
+        path: of the file; all ranks read it. ``#`` begins a comment.
+        unit: of the acceleration in the file, ``"m/s2"``, ``"cm/s2"`` or ``"g"``.
 
     Raises:
         InputError: an unknown unit, a file that cannot be read or has not two columns of numbers, times that do not rise.
@@ -87,7 +100,9 @@ def read_accelerogram(path: str | os.PathLike[str], *, unit: str, baseline: int 
         raise InputError(
             f"accelerogram {os.fspath(path)} has {columns.shape[-1]} columns, expected time and acceleration"
         )
-    return motion_of_acceleration(columns[:, 0], factors[unit] * columns[:, 1], baseline=baseline)
+    time, acceleration = _column("time", columns[:, 0]), factors[unit] * _column("acceleration", columns[:, 1])
+    _require_series(time, "acceleration", acceleration)
+    return time, acceleration
 
 
 def _column(name: str, values: ArrayLike) -> NDArray[np.float64]:

@@ -1,6 +1,7 @@
 """What the study earthquake compares with: sliding blocks, yield accelerations, layers over a half-space, and its motions."""
 
 import sys
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,8 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
 
-from common.motions import as_motion, band_limited_noise, ricker  # noqa: E402
+from common.earthquake_site import outcrop_motion  # noqa: E402
+from common.motions import accelerations, as_motion, band_limited_noise, ricker  # noqa: E402
 from common.newmark import pulse_slip, sliding_block, yield_acceleration  # noqa: E402
 from common.site_response import amplification, spectral_ratio  # noqa: E402
 
@@ -109,3 +111,24 @@ def test_a_motion_ends_at_rest():
     motion = as_motion(time, acceleration + 0.05)  # an error of the record's zero
     assert motion.velocity[-1] == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(motion.velocity, as_motion(time, acceleration).velocity, atol=1e-12)
+
+
+def test_a_recorded_motion_keeps_its_high_frequencies(tmp_path):
+    # A record of 8 Hz in steps of 0.02 s: it is read as it is, and its velocity is the sum of trapezia, with an envelope and a
+    # duration of whole periods so that there is neither a trend nor an end to fade.
+    time = 0.02 * np.arange(1001)
+    acceleration = np.sin(16 * np.pi * time) * np.sin(0.05 * np.pi * time) ** 4
+    path = tmp_path / "record.txt"
+    np.savetxt(path, np.column_stack([time, 100 * acceleration]), fmt="%.12g")
+    read, found, motion = outcrop_motion(Namespace(accelerogram=path, unit="cm/s2"))
+    np.testing.assert_allclose(read, time, rtol=1e-12)
+    np.testing.assert_allclose(found, acceleration, atol=1e-10)
+    exact = np.append(0.0, np.cumsum(0.01 * (acceleration[1:] + acceleration[:-1])))
+    np.testing.assert_allclose(motion.velocity, exact, atol=0.01 * abs(exact).max())
+
+
+def test_the_acceleration_of_a_motion_is_that_between_its_samples():
+    # The motion rises by 3 m/s2 over a single interval: the gradient at the samples would be half of it.
+    middle, found = accelerations(np.array([0.0, 0.1, 0.2, 0.4]), np.array([0.0, 0.3, 0.3, 0.3]))
+    np.testing.assert_allclose(middle, [0.05, 0.15, 0.3])
+    np.testing.assert_allclose(found, [3.0, 0.0, 0.0], atol=1e-12)
