@@ -16,7 +16,6 @@ from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.fem.fields import cell_function
 from fenics_bridge.transfer.moved import cell_gradient
 from fenics_bridge.water.consolidation import Consolidation
-from fenics_bridge.water.motion import STANDARD_GRAVITY
 
 _SAME_SATURATION = 1e-3
 """Difference of degrees of saturation up to which retention curves count as the same"""
@@ -54,6 +53,7 @@ def balance_dried_soil(
     if not (water.may_dry and fem._terms.may_dry):
         return stress
     acting, lost = fem._terms.dried()
+    lost.x.array[:] /= fem.water.gravity  # [kg/m3]
     cells, centres = p.cell, mesh.points[mesh.cells].mean(axis=1)
     filled = np.bincount(cells, p.volume, len(mesh.cells))
     there = search.values(cell_function(fem.domain, ufl.SpatialCoordinate(fem.domain), 0, "centre"))
@@ -71,19 +71,17 @@ def balance_dried_soil(
     offset = p.position - centres[cells]
     slope = search.values(cell_gradient(lost))
     wanted = search.values(lost)[:, 0] - np.einsum("pa,pa->p", slope, offset)  # at the centre
-    weight = STANDARD_GRAVITY * water.density * p.porosity * (1 - p.saturation)
+    dried = water.density * p.porosity * (1 - p.saturation)
     mass = p.mass.copy()
-    mass[rows] -= (
-        p.volume[rows] * _corrections(mesh, cells, p.volume, offset, weight, wanted, slope, rows) / STANDARD_GRAVITY
-    )
+    mass[rows] -= p.volume[rows] * _corrections(mesh, cells, p.volume, offset, dried, wanted, slope, rows)
     p.set("mass", mass)
     return stress
 
 
 def _corrections(
-    mesh: Any, cells: Any, volume: Any, offset: Any, weight: Any, wanted: Any, slope: Any, rows: Any
+    mesh: Any, cells: Any, volume: Any, offset: Any, dried: Any, wanted: Any, slope: Any, rows: Any
 ) -> NDArray[np.float64]:
-    """What weights of particles lack of the moments of a linear function in their cell, as such a function [N/m3].
+    """What densities of particles lack of the moments of a linear function in their cell, as such a function [kg/m3].
 
     Where a cell has too few particles for all moments, they get the sum.
     """
@@ -92,7 +90,7 @@ def _corrections(
     terms = np.column_stack([np.ones(len(rows)), offset[rows]])
     moments, lacking = np.zeros((len(used), dim + 1, dim + 1)), np.zeros((len(used), dim + 1))
     np.add.at(moments, number, volume[rows, None, None] * terms[:, :, None] * terms[:, None, :])
-    np.subtract.at(lacking, number, (volume * weight)[rows, None] * terms)
+    np.subtract.at(lacking, number, (volume * dried)[rows, None] * terms)
     corners = mesh.points[mesh.cells[used]]
     corners = corners - corners.mean(axis=1, keepdims=True)
     second = np.einsum("cka,ckb->cab", corners, corners) / ((dim + 1) * (dim + 2))

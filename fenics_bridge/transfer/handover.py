@@ -111,6 +111,7 @@ def initialise(
     particles = model.particles
     _require_usable(model, fem, move)
     _warn_of_other_weight(model, fem)
+    _warn_of_other_water(model, fem)
     _warn_of_missing_loads(model, fem)
     if resting:
         agree(model.comm, "move is True, expected False with resting: resting cells are not moved" if move else None)
@@ -228,6 +229,20 @@ def _warn_of_other_weight(model: mpm.Model, fem: Any) -> None:
         warnings.warn(
             f"the unit weight of particles is {low if too_low else high:.5g} N/m3, density times gravity, that of the finite "
             f"elements {min(carried):.5g} to {max(carried):.5g} N/m3: their equilibrium is another one",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+
+
+def _warn_of_other_water(model: mpm.Model, fem: Any) -> None:
+    """Warn, on the first rank, of water in the pores of particles that weighs more or less than that of the finite elements."""
+    if not isinstance(fem, Consolidation) or model.comm.rank != 0:
+        return
+    own, carried = model._core.water.density * float(np.linalg.norm(model.gravity)), fem.water.unit_weight
+    if abs(own - carried) > SAME_WEIGHT * carried:
+        warnings.warn(
+            f"the unit weight of the particles' water is {own:.5g} N/m3, density times gravity, that of the finite elements "
+            f"{carried:.5g} N/m3 (gravity, unit_weight): their equilibrium is another one",
             RuntimeWarning,
             stacklevel=3,
         )

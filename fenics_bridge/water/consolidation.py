@@ -9,7 +9,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
-from mpm_core.setup_warnings import warn_of_water_weight
+from mpm_core.water_checks import LABORATORY_GRAVITY
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
@@ -46,7 +46,7 @@ from fenics_bridge.water.motion import Motion, Newmark
 from fenics_bridge.water.projection import PressureProjection
 from fenics_bridge.water.retention import AlwaysSaturated
 from fenics_bridge.water.seepage import Seepage
-from fenics_bridge.water.soils import WATER_MODULUS, WATER_WEIGHT, PorousSoil, soils_by_tag
+from fenics_bridge.water.soils import WATER_MODULUS, PorousSoil, given_water, soils_by_tag
 from fenics_bridge.water.time_steps import run
 from mpm_core import Geometry
 
@@ -74,12 +74,13 @@ class Consolidation(ConsolidationResults):
             averaged as those of particles (`QuasiStatic` with ``as_particles=True``), by half in soil that dilates little.
         cell_tags: tags of the cells; needed where laws, soils or unit weights are given by cell tag.
         geometry: as for `QuasiStatic`.
-        unit_weight: unit weight of water [N/m3].
+        unit_weight: unit weight of water [N/m3], under the gravity of the model; by default that of 1000 kg/m3.
         water_modulus: bulk modulus of water [Pa], may be infinite.
         solver: solver, of which tolerance and iterations count.
         options_prefix: prefix of the PETSc options of the linear solver.
         inertia: Newmark's method for steps with inertia of soil and water, which move together; soils then need a density.
             None for quasi-static steps.
+        gravity: of the model [m/s2], which is that of the unit weights; conductivities are those under 9.81 m/s2.
 
     Raises:
         InputError: an unknown tag, cells without law or soil, or another argument out of range. Raised on all ranks alike.
@@ -98,14 +99,16 @@ class Consolidation(ConsolidationResults):
         nmd: bool = False,
         cell_tags: MeshTags | None = None,
         geometry: Geometry | None = None,
-        unit_weight: float = WATER_WEIGHT,
+        unit_weight: float | None = None,
         water_modulus: float = WATER_MODULUS,
         solver: Solver | None = None,
         options_prefix: str = "consolidation_",
         inertia: Newmark | None = None,
+        gravity: float = LABORATORY_GRAVITY,
     ) -> None:
-        agree(domain.comm, _first_mistake(element, nmd, soil, unit_weight, water_modulus, geometry, inertia))
-        warn_of_water_weight(domain.comm, unit_weight)
+        agree(domain.comm, _first_mistake(element, nmd, soil, geometry, inertia))
+        self.water = given_water(domain.comm, unit_weight, gravity, water_modulus, infinite=True)
+        """Unit weight and modulus of the water, and the gravity of the model"""
         self.domain = domain
         """Mesh of the body"""
         self.geometry = geometry_of(domain, geometry)
@@ -120,13 +123,13 @@ class Consolidation(ConsolidationResults):
         """Tolerances of the solution"""
         self.radius = radius_of(domain, self.geometry)
         """Radius of an axisymmetric body, a UFL expression; None in others"""
-        self._weights, self._facet_tags = (unit_weight, water_modulus), facet_tags
+        self._facet_tags = facet_tags
         self._space = space = compat.displacement_pressure_space(domain, element.value)
         self._displacements, self._pressures = ((part, np.asarray(dofs)) for part, dofs in _parts(space))
         self._supports = Constraints(space.sub(0), facet_tags, supports)
         require_axis_held(space.sub(0), self.geometry, self._supports)
         self._materials, self._soils = Materials(domain, law, cell_tags), soils_by_tag(
-            domain, soil, cell_tags, dry=True
+            domain, soil, cell_tags, dry=True, gravity=gravity
         )
         self._laws = self._materials.laws(law)
         degree = max(1, 2 * (element.value - 1))
@@ -173,7 +176,7 @@ class Consolidation(ConsolidationResults):
             increment,
             self._soils[0],
             self._soils[1],
-            self._weights,
+            self.water,
             self._unit,
             self.radius,
             degree,
@@ -196,7 +199,7 @@ class Consolidation(ConsolidationResults):
         self._projection = None
         if self._element == Element.STABILISED:
             self._projection = PressureProjection(
-                domain, self.points, self._laws, self._soils[0], self._soils[2], self._weights
+                domain, self.points, self._laws, self._soils[0], self._soils[2], self.water
             )
         unit, dry = _largest_conductivity(self._soils[0]), len(self._waterless)
         self._applied = AppliedBoundary(
@@ -212,7 +215,7 @@ class Consolidation(ConsolidationResults):
         held = any(not isinstance(condition, Flux) for condition in self.boundary)
         free = (
             not held
-            and np.isinf(self._weights[1])
+            and np.isinf(self.water.modulus)
             and pressure_is_free(self._space, self._supports, self.radius, self._wet)
         )
         agree(self.domain.comm, "boundary: no head, reservoir, seepage face or rain, incompressible water and supports all "
@@ -225,7 +228,7 @@ class Consolidation(ConsolidationResults):
             body.kinematics = Kinematics(*parts, self.geometry, further)
         there = self._there if len(self.off) else None
         self._reservoirs = ReservoirLoads(
-            self._space, self._facet_tags, self._applied, self._weights[0], self.radius, there
+            self._space, self._facet_tags, self._applied, self.water.unit_weight, self.radius, there
         )
 
     def initialise(
@@ -366,7 +369,7 @@ class Consolidation(ConsolidationResults):
         """What `solve_step` returns for the step under way."""
         fixed, heads, upper = self._applied.bounds(end)
         fixed[self._waterless], heads[self._waterless] = True, 0.0
-        unit = self._weights[0] / self._unit
+        unit = self.water.unit_weight / self._unit
 
         def step() -> Any:
             return CoupledStep(
@@ -398,9 +401,7 @@ def _largest_conductivity(soils: Any) -> float:
     return max(np.linalg.eigvalsh(soil.tensor(soil.conductivity, 3)).max() for soil in soils)
 
 
-def _first_mistake(
-    element: Any, nmd: bool, soil: Any, unit_weight: Any, water_modulus: float, geometry: Any, inertia: Any
-) -> str | None:
+def _first_mistake(element: Any, nmd: bool, soil: Any, geometry: Any, inertia: Any) -> str | None:
     if not isinstance(element, Element):
         return f"element is {element!r}, expected one of {', '.join(map(str, Element))}"
     if nmd and element != Element.STABILISED:
@@ -413,8 +414,4 @@ def _first_mistake(
             return f"soil: {one!r} has no density, expected one for steps with inertia"
     if not isinstance(inertia, (Newmark, type(None))):
         return f"inertia is {inertia!r}, expected a Newmark, or None"
-    if not (np.isfinite(unit_weight) and unit_weight > 0):
-        return f"unit_weight is {unit_weight!r} N/m3, expected a positive number"
-    if not water_modulus > 0:
-        return f"water_modulus is {water_modulus!r} Pa, expected a positive number, or infinity"
     return None

@@ -30,9 +30,9 @@ from fenics_bridge.fem.loads import pressing
 from fenics_bridge.mesh.tagged import cell_volumes
 from fenics_bridge.types import MeshTags
 from fenics_bridge.water.boundary import Reservoir, value_at
-from fenics_bridge.water.motion import STANDARD_GRAVITY, Motion
+from fenics_bridge.water.motion import Motion
 from fenics_bridge.water.retention import AlwaysSaturated
-from fenics_bridge.water.soils import PorousSoil
+from fenics_bridge.water.soils import PorousSoil, Water
 
 
 class Element(Enum):
@@ -61,7 +61,7 @@ class WaterTerms:
         increment: their change in the step.
         soils: soils, as of `soils_by_tag`.
         measures: measures over their cells, likewise.
-        weights: unit weight [N/m3] and bulk modulus [Pa] of water.
+        water: the water.
         unit: unit of pressure [Pa].
         radius: radius of an axisymmetric body, a UFL expression.
         degree: degree of the quadrature.
@@ -75,7 +75,7 @@ class WaterTerms:
         increment: fem.Function,
         soils: Sequence[PorousSoil],
         measures: Sequence[Any],
-        weights: tuple[float, float],
+        water: Water,
         unit: float,
         radius: Any,
         degree: int,
@@ -86,8 +86,8 @@ class WaterTerms:
         self._up = ufl.as_vector([0.0] * (domain.geometry.dim - 1) + [1.0])
         self._dim, self._increment, self._unit, self._radius = domain.geometry.dim, increment, unit, radius
         self._there, self._motion = there, motion
-        self._driving = self._up + motion.at_end / STANDARD_GRAVITY if motion else self._up
-        self._soils, (self._gamma, self._modulus) = soils, weights
+        self._driving = self._up + motion.at_end / water.gravity if motion else self._up
+        self._soils, self._gamma, self._modulus = soils, water.unit_weight, water.modulus
         rule = {"quadrature_degree": degree}
         curved = [_may_dry(soil) for soil in soils]
         self._measures = [dx(metadata=UNSATURATED if dry else rule) for dx, dry in zip(measures, curved)]

@@ -12,9 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from fenics_bridge.errors import InputError, agree
 from fenics_bridge.types import OfPosition
 
-STANDARD_GRAVITY = 9.81
-"""Gravity by which unit weights are divided to get densities [m/s2]"""
-
 
 @dataclass(frozen=True)
 class Newmark:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fenics_bridge import compat
 from fenics_bridge.mesh.tagged import cell_corners, owned_cells
 from fenics_bridge.types import Law
-from fenics_bridge.water.soils import PorousSoil
+from fenics_bridge.water.soils import PorousSoil, Water
 
 MARGIN = 4
 """Factor of the pressure projection over the least factor that suffices in uniaxial strain, in cells that are not flat"""
@@ -40,7 +40,7 @@ class PressureProjection:
         laws: the laws, by number.
         soils: soils, as of `soils_by_tag`.
         cells: cells of each of them.
-        weights: unit weight [N/m3] and bulk modulus [Pa] of water.
+        water: the water.
     """
 
     def __init__(
@@ -50,9 +50,9 @@ class PressureProjection:
         laws: Sequence[Law],
         soils: Sequence[PorousSoil],
         cells: Sequence[NDArray[np.int32]],
-        weights: tuple[float, float],
+        water: Water,
     ) -> None:
-        (gamma, modulus), corners, n = weights, cell_corners(domain), owned_cells(domain)
+        corners, n = cell_corners(domain), owned_cells(domain)
         dim = corners.shape[2]
         longest = np.sum((corners[:, :, None] - corners[:, None]) ** 2, axis=3).max(axis=(1, 2))
         from_centroid = corners - corners.mean(axis=1, keepdims=True)
@@ -61,8 +61,8 @@ class PressureProjection:
         self._points, self._laws = points, laws
         for soil, own in zip(soils, cells):
             own = own[own < n]
-            storage[own], density[own] = soil.porosity / modulus, soil.density or 0.0
-            mobility[own] = np.linalg.eigvalsh(soil.tensor(soil.conductivity, dim)).min() / gamma
+            storage[own], density[own] = soil.porosity / water.modulus, soil.density or 0.0
+            mobility[own] = np.linalg.eigvalsh(soil.tensor(soil.conductivity, dim)).min() / water.unit_weight
         self._moments = MARGIN * (dim + 1) * (_slenderness(corners, longest)[:, None] * moments.reshape(n, -1))
         self._storage, self._per_second = storage, 6 * mobility / longest
         self._mass = density * longest / (12 * dim)

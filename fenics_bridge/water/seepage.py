@@ -20,7 +20,7 @@ import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
-from mpm_core.setup_warnings import warn_of_water_weight
+from mpm_core.water_checks import LABORATORY_GRAVITY
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
@@ -31,7 +31,7 @@ from fenics_bridge.water.applied import AppliedBoundary
 from fenics_bridge.water.boundary import WaterBoundary, listed
 from fenics_bridge.water.complementarity import BoundedProblem
 from fenics_bridge.water.positions import at_positions
-from fenics_bridge.water.soils import WATER_MODULUS, WATER_WEIGHT, PorousSoil, soils_by_tag
+from fenics_bridge.water.soils import WATER_MODULUS, PorousSoil, given_water, soils_by_tag
 
 QUADRATURE = {1: 3, 2: 5}
 """Degree of the quadrature by the degree of the elements; permeabilities that vary within a cell have no exact one."""
@@ -55,11 +55,12 @@ class Seepage:
             prescribed head holds before the others.
         cell_tags: tags of the cells; needed where soils are given by cell tag.
         degree: degree of the elements, 1 or 2.
-        unit_weight: unit weight of water [N/m3].
+        unit_weight: unit weight of water [N/m3], under the gravity of the model; by default that of 1000 kg/m3.
         water_modulus: bulk modulus of water [Pa].
         options_prefix: prefix of the PETSc options of the solver.
         loading: function of positions (n, D) [m] and time [s] that returns the vertical total stress (n,) [Pa, compression
             positive] that changes in time, such as `standing_water(...)`; it acts through the compressibility of the soils.
+        gravity: of the model [m/s2], which is that of the unit weights; conductivities are those under 9.81 m/s2.
 
     Raises:
         InputError: an unknown tag, cells without a soil, or another argument out of range. Raised on all ranks alike.
@@ -73,23 +74,20 @@ class Seepage:
         boundary: Iterable[WaterBoundary],
         cell_tags: MeshTags | None = None,
         degree: int = 1,
-        unit_weight: float = WATER_WEIGHT,
+        unit_weight: float | None = None,
         water_modulus: float = WATER_MODULUS,
         options_prefix: str = "seepage_",
         loading: Callable[[NDArray[np.float64], float], ArrayLike] | None = None,
+        gravity: float = LABORATORY_GRAVITY,
     ) -> None:
         comm = domain.comm
-        problem = None if degree in (1, 2) else f"degree is {degree!r}, expected 1 or 2"
-        for name, value in (("unit_weight", unit_weight), ("water_modulus", water_modulus)):
-            if not (np.isfinite(value) and value > 0):
-                problem = f"{name} is {value!r}, expected a positive number"
-        agree(comm, problem)
-        warn_of_water_weight(comm, unit_weight)
+        agree(comm, None if degree in (1, 2) else f"degree is {degree!r}, expected 1 or 2")
+        given = given_water(comm, unit_weight, gravity, water_modulus)
         self.domain = domain
         """Mesh of the body"""
-        self.unit_weight = unit_weight
+        self.unit_weight = given.unit_weight
         """Unit weight of water [N/m3]"""
-        self.water_modulus = water_modulus
+        self.water_modulus = given.modulus
         """Bulk modulus of water [Pa]"""
         self.time = 0.0
         """Time of the flow [s]"""
@@ -101,7 +99,7 @@ class Seepage:
         self._loading, self._load, self._old_load = loading, fem.Function(space), fem.Function(space)
         self._up = ufl.as_vector([0.0] * (self._dim - 1) + [1.0])
         self._dt, self._sharpness = fem.Constant(domain, 1.0), fem.Constant(domain, 1.0)
-        self._soils, self._measures, self._cells = soils_by_tag(domain, soil, cell_tags)
+        self._soils, self._measures, self._cells = soils_by_tag(domain, soil, cell_tags, gravity=gravity)
         self._largest = max(np.linalg.eigvalsh(s.tensor(s.conductivity, self._dim)).max() for s in self._soils)
         self._applied = AppliedBoundary(space, facet_tags, self._largest)
         self._steady, self._transient, self._stored, self._prefix = None, None, None, options_prefix

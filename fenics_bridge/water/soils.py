@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
 from dolfinx.mesh import Mesh
+from mpi4py import MPI
 from mpm_core.retention import curve_values
+from mpm_core.setup_warnings import warn_of_water_density
+from mpm_core.water_checks import LABORATORY_GRAVITY
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.errors import InputError, agree, is_finite
@@ -17,11 +20,46 @@ from fenics_bridge.mesh.tagged import owned_cells, tag_values
 from fenics_bridge.types import MeshTags
 from fenics_bridge.water.retention import AlwaysSaturated
 
-WATER_WEIGHT = 9810.0
-"""Unit weight of water [N/m3]."""
+WATER_DENSITY = 1000.0
+"""Density of water [kg/m3]."""
+
+WATER_WEIGHT = WATER_DENSITY * LABORATORY_GRAVITY
+"""Unit weight of water under 9.81 m/s2 [N/m3]."""
 
 WATER_MODULUS = 2.2e9
 """Bulk modulus of water [Pa]."""
+
+
+class Water(NamedTuple):
+    """Water in the pores, as `given_water` checks it."""
+
+    unit_weight: float
+    """gamma_w [N/m3], under the gravity of the model"""
+    modulus: float
+    """K_w [Pa]"""
+    gravity: float
+    """Gravity of the model [m/s2]"""
+
+
+def given_water(
+    comm: MPI.Comm, unit_weight: float | None, gravity: float, modulus: float = WATER_MODULUS, infinite: bool = False
+) -> Water:
+    """Water of a unit weight [N/m3] under a gravity [m/s2], by default that of 1000 kg/m3; warns of an odd one. Collective.
+
+    Raises:
+        InputError: a number that is not positive; the modulus [Pa] may be infinite where that is allowed. Raised on all ranks alike.
+    """
+    agree(
+        comm, None if is_finite(gravity) and gravity > 0 else f"gravity is {gravity!r} m/s2, expected a positive number"
+    )
+    weight = WATER_DENSITY * gravity if unit_weight is None else unit_weight
+    good = is_finite(weight) and weight > 0
+    agree(comm, None if good else f"unit_weight is {unit_weight!r} N/m3, expected a positive number")
+    good = modulus > 0 and (infinite or is_finite(modulus))
+    further = ", or infinity" if infinite else ""
+    agree(comm, None if good else f"water_modulus is {modulus!r} Pa, expected a positive number{further}")
+    warn_of_water_density(comm, weight / gravity, stacklevel=4)
+    return Water(weight, modulus, gravity)
 
 
 @dataclass(frozen=True)
@@ -33,7 +71,8 @@ class PorousSoil:
     """
 
     conductivity: Any
-    """Saturated hydraulic conductivity k [m/s]: a number, (D,) along the axes, or a symmetric (D, D) tensor; positive"""
+    """Saturated hydraulic conductivity k [m/s]: a number, (D,) along the axes, or a symmetric (D, D) tensor; positive. As measured
+    in a laboratory under 9.81 m/s2, whatever the gravity of the model"""
     porosity: float = 0.4
     """Porosity n [-], in (0, 1); for transient flow only"""
     compressibility: float = 0.0
@@ -105,7 +144,7 @@ def dipping(along: float, across: float, dip: float, direction: float | None = N
 
 
 def soils_by_tag(
-    domain: Mesh, soil: Any, cell_tags: MeshTags | None, dry: bool = False
+    domain: Mesh, soil: Any, cell_tags: MeshTags | None, dry: bool = False, gravity: float = LABORATORY_GRAVITY
 ) -> tuple[list[PorousSoil], list[Any], list[NDArray[np.int32]]]:
     """The soils, the measure over the cells of each, and these cells, ghosts too. Collective.
 
@@ -114,6 +153,7 @@ def soils_by_tag(
         soil: soil, or soils by cell tag or name.
         cell_tags: tags of the cells.
         dry: whether some may be None, which holds no water and is left out.
+        gravity: of the model [m/s2], under which the soils that are returned have their conductivities.
 
     Raises:
         InputError: a tag does not exist or has no soil, or a conductivity is of another dimension. Raised on all ranks alike.
@@ -128,7 +168,7 @@ def soils_by_tag(
               f"({dim}, {dim}) in {dim}D")  # fmt: skip
     if not isinstance(soil, dict):
         every = np.arange(owned_cells(domain) + domain.topology.index_map(dim).num_ghosts, dtype=np.int32)
-        return [soil], [ufl.Measure("dx", domain=domain)], [every]
+        return [_under(soil, gravity)], [ufl.Measure("dx", domain=domain)], [every]
     agree(comm, "cell_tags is None, expected the tags that the soils are given for" if cell_tags is None else None)
     by_tag = by_number(comm, cell_tags, by_tag, "soil", "cell")
     values = tag_values(domain, cell_tags, dim)
@@ -139,4 +179,11 @@ def soils_by_tag(
     wet = [tag for tag, one in by_tag.items() if one is not None]
     agree(comm, None if wet else "soil is None for all cells, expected a PorousSoil for some")
     cells = [np.flatnonzero(values == tag).astype(np.int32) for tag in wet]
-    return [by_tag[tag] for tag in wet], [dx(tag) for tag in wet], cells
+    return [_under(by_tag[tag], gravity) for tag in wet], [dx(tag) for tag in wet], cells
+
+
+def _under(soil: Any, gravity: float) -> Any:
+    """A soil with its conductivity under a gravity [m/s2], in which k / gamma_w is the same."""
+    if gravity == LABORATORY_GRAVITY:
+        return soil
+    return replace(soil, conductivity=gravity / LABORATORY_GRAVITY * np.asarray(soil.conductivity))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from dolfinx.mesh import Mesh
+from mpm_core.water_checks import LABORATORY_GRAVITY
 from numpy.typing import NDArray
 
 from fenics_bridge.compat import facet_nodes
@@ -14,11 +15,15 @@ from fenics_bridge.errors import agree
 from fenics_bridge.fem.supports import tagged_facets
 from fenics_bridge.types import MeshTags
 from fenics_bridge.water.boundary import Reservoir, WaterBoundary, value_at
-from fenics_bridge.water.soils import WATER_WEIGHT
+from fenics_bridge.water.soils import given_water
 
 
 def standing_water(
-    domain: Mesh, facet_tags: MeshTags, boundary: Sequence[WaterBoundary], unit_weight: float = WATER_WEIGHT
+    domain: Mesh,
+    facet_tags: MeshTags,
+    boundary: Sequence[WaterBoundary],
+    unit_weight: float | None = None,
+    gravity: float = LABORATORY_GRAVITY,
 ) -> Callable[[NDArray[np.float64], float], NDArray[np.float64]]:
     """Pressure of the reservoirs on the ground above each point, for `loading` of `Seepage`, in plane sections. Collective.
 
@@ -26,7 +31,8 @@ def standing_water(
         domain: mesh of the body.
         facet_tags: tags of the boundary.
         boundary: boundary conditions, of which each Reservoir counts; its surface has one height at each horizontal coordinate.
-        unit_weight: unit weight of water [N/m3].
+        unit_weight: unit weight of water [N/m3], under the gravity of the model; by default that of 1000 kg/m3.
+        gravity: of the model [m/s2].
 
     Returns:
         Function of positions (n, 2) [m] and a time [s] that returns pressures (n,) [Pa]; it may be called on any rank.
@@ -34,7 +40,7 @@ def standing_water(
     Raises:
         InputError: the mesh has not two dimensions, a tag is unknown, or there is no reservoir. Raised on all ranks alike.
     """
-    dim = domain.geometry.dim
+    dim, weight = domain.geometry.dim, given_water(domain.comm, unit_weight, gravity).unit_weight
     agree(domain.comm, None if dim == 2 else f"domain has {dim} dimensions, expected a plane section")
     reservoirs = [condition for condition in boundary if isinstance(condition, Reservoir)]
     agree(domain.comm, None if reservoirs else "boundary has no Reservoir, expected one or more")
@@ -51,7 +57,7 @@ def standing_water(
             below = (points[:, 0] >= x[0] - close) & (points[:, 0] <= x[-1] + close)
             depth = np.where(below, value_at(condition.level, time) - np.interp(points[:, 0], x, y), 0.0)
             deepest = np.maximum(deepest, depth)
-        return unit_weight * deepest
+        return weight * deepest
 
     return pressure
 
