@@ -49,15 +49,14 @@ def given_water(
     Raises:
         InputError: a number that is not positive; the modulus [Pa] may be infinite where that is allowed. Raised on all ranks alike.
     """
-    agree(
-        comm, None if is_finite(gravity) and gravity > 0 else f"gravity is {gravity!r} m/s2, expected a positive number"
-    )
-    weight = WATER_DENSITY * gravity if unit_weight is None else unit_weight
-    good = is_finite(weight) and weight > 0
-    agree(comm, None if good else f"unit_weight is {unit_weight!r} N/m3, expected a positive number")
-    good = modulus > 0 and (infinite or is_finite(modulus))
-    further = ", or infinity" if infinite else ""
-    agree(comm, None if good else f"water_modulus is {modulus!r} Pa, expected a positive number{further}")
+    mistake = None
+    if not (is_finite(gravity) and gravity > 0):
+        mistake = f"gravity is {gravity!r} m/s2, expected a positive number"
+    elif not (is_finite(weight := WATER_DENSITY * gravity if unit_weight is None else unit_weight) and weight > 0):
+        mistake = f"unit_weight is {unit_weight!r} N/m3, expected a positive number"
+    elif not (modulus > 0 and (infinite or is_finite(modulus))):
+        mistake = f"water_modulus is {modulus!r} Pa, expected a positive number{', or infinity' if infinite else ''}"
+    agree(comm, mistake)
     warn_of_water_density(comm, weight / gravity, stacklevel=4)
     return Water(weight, modulus, gravity)
 
