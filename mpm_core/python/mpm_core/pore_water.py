@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from ._core import InputError
 from .anisotropy import tensors_of_laws
-from .checks import positive
 from .collective import collectively
 from .conditions import Conditions
 from .mesh import Tag, floats

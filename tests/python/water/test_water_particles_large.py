@@ -19,7 +19,7 @@ def column(cells, load, per_cell=12):
     model.roller(1, (1, 0))
     model.roller(2, (1, 0))
     model.fix(3)
-    model.add_water(porosity=0.6, conductivity=CONDUCTIVITY, modulus=np.inf, unit_weight=WEIGHT, drained_surface=True)
+    model.add_water(porosity=0.6, conductivity=CONDUCTIVITY, modulus=np.inf, drained_surface=True)
     y = model.particles.position[:, 1]
     force = np.zeros((len(y), 2))
     force[y > y.max() - 1e-9, 1] = -load * width / np.sum(y > y.max() - 1e-9)
