@@ -30,7 +30,7 @@ void find_means(const Mesh<G::dim>& mesh, NodeExchange& exchange, const Explicit
                 VelocityField<G>& field)
 {
   if (options.nmd)
-    average_strains(mesh, exchange, field, dt);
+    average_strains(mesh, exchange, field.velocity, dt, field);
   if (options.integration == Integration::dual_domain)
     average_gradients(mesh, exchange, field);
 }

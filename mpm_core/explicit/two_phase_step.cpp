@@ -54,7 +54,7 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
   find_flux(mesh, soil, *model.water, water);
   if (options.nmd)
   {
-    average_strains(mesh, exchange, soil, dt);
+    average_strains(mesh, exchange, soil.velocity, dt, soil);
     average_outflow(mesh, exchange, dt, water);
   }
   // Nodes to particles: the water's velocity, mass and pressure; then (18), (20), effective stresses; migration

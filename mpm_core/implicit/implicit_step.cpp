@@ -105,7 +105,7 @@ TrialReport find_residual(Model<G>& model, ImplicitStep<G>& step, bool tangents)
   // Trial: stresses under u = dt v, from the step's start (I2)
   update(step.halos.nodes, field.velocity);
   if (step.options.nmd)
-    average_strains(mesh, exchange, field, step.dt); // (T6)
+    average_strains(mesh, exchange, field.velocity, step.dt, field); // (T6)
   const auto count = try_stresses(mesh, points_of(model, step), field, tangents, step);
   if (step.options.average_stress)
     average_stresses<G>(mesh, exchange, field, step.stress);
@@ -208,7 +208,7 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
   const ImplicitOptions& options = step.options;
   VelocityField<G>& field = model.fields.front();
   if (options.nmd)
-    average_strains(model.mesh, model.exchange, field, step.dt);
+    average_strains(model.mesh, model.exchange, field.velocity, step.dt, field);
   find_acceleration(step, field);
   const double pic = pic_fraction(model, step);
   find_velocity_change(field, pic, step.dt);

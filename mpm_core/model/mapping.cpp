@@ -238,7 +238,8 @@ void find_velocity_change(VelocityField<G>& field, double pic_fraction, double d
 }
 
 template <class G, int D>
-void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field, double dt)
+void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Vector<G::dim>>& nodal, double dt,
+                     VelocityField<G>& field)
 {
   // Averages of stress have found the volumes, and left them side by side.
   const bool known = !field.integration.averaged_by_law.empty() && !field.integration.strains_in_full;
@@ -252,7 +253,7 @@ void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<
                               double divergence = 0;
                               for (int k = 0; k <= D; ++k)
                               {
-                                const Vector<D>& v = value_of(field.velocity, c, k);
+                                const Vector<D>& v = value_of(nodal, c, k);
                                 divergence += dot<D>(v, mesh.shapes[c].gradient[k]);
                                 if constexpr (G::has_hoop)
                                   divergence += v[0] * hoop_gradient<G>(mesh.shapes[c]);
@@ -287,7 +288,8 @@ void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField
                                               const std::vector<Vector<G::dim>>&, Index);                              \
   template void find_start_velocity(VelocityField<G>&);                                                                \
   template void find_velocity_change(VelocityField<G>&, double, double);                                               \
-  template void average_strains(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&, double);                        \
+  template void average_strains(const Mesh<G::dim>&, NodeExchange&, const std::vector<Vector<G::dim>>&, double,        \
+                                VelocityField<G>&);                                                                    \
   template void average_stresses(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&, std::span<Working<G>>);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

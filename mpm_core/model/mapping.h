@@ -88,11 +88,13 @@ void find_start_velocity(VelocityField<G>& field);
 template <class G>
 void find_velocity_change(VelocityField<G>& field, double pic_fraction, double dt);
 
-/// Volumetric strains of the nodes over dt [s] from the field's `velocity`, averages over the cells around them (nodal
-/// mixed discretisation).
+/// Volumetric strains of the nodes over dt [s] from nodal velocities, averages over the cells around them (nodal mixed
+/// discretisation).
+/// @param nodal  one of the nodal velocities of the field
 /// @note Collective
 template <class G, int D = G::dim>
-void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField<G>& field, double dt);
+void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Vector<G::dim>>& nodal, double dt,
+                     VelocityField<G>& field);
 
 /// Averages the mean of the normal components of the cells' stress times volume, as strains are averaged.
 ///

@@ -17,6 +17,13 @@ double damped_time_step(const Rayleigh& rayleigh, double critical)
 
 namespace
 {
+/// Whether the strains of the field are averaged over nodes.
+template <class G>
+bool is_averaged(const VelocityField<G>& field)
+{
+  return !field.integration.averaged_by_law.empty();
+}
+
 /// beta times the rate of elastic stress of a cell, by the velocities at the start.
 template <class G, int D = G::dim>
 Working<G> viscous_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell, const WaveModuli& moduli,
@@ -31,21 +38,24 @@ Working<G> viscous_stress(const Mesh<D>& mesh, const VelocityField<G>& field, In
   for (int i = 0; i < D; ++i)
     trace += velocity.gradient[i][i];
   trace += hoop;
+  const double averaged = is_averaged(field) ? averaged_strain(mesh, field, cell, trace) : trace;
+  const double mean = lambda * averaged + 2 * mu * (averaged - trace) / G::n_normal;
   Working<G> stress;
   for (int s = 0; s < n_symmetric<D>; ++s)
   {
     const auto [i, j] = symmetric_pairs<D>[s];
-    stress[s] = mu * (velocity.gradient[i][j] + velocity.gradient[j][i]) + (i == j ? lambda * trace : 0);
+    stress[s] = mu * (velocity.gradient[i][j] + velocity.gradient[j][i]) + (i == j ? mean : 0);
   }
   if constexpr (G::has_hoop)
-    stress[n_symmetric<D>] = lambda * trace + 2 * mu * hoop;
+    stress[n_symmetric<D>] = mean + 2 * mu * hoop;
   return stress;
 }
 
-/// Adds the forces of the points of one law in a cell to the nodes.
+/// Adds what the points of one law in a cell give: stress times volume to the cell, and forces in proportion to mass to
+/// its nodes.
 template <class G, int D = G::dim>
 void add_run(const Mesh<D>& mesh, const MaterialPoints<D>& points, const Run& run, const Rayleigh& rayleigh,
-             VelocityField<G>& field)
+             std::vector<Working<G>>& stress, VelocityField<G>& field)
 {
   double mass = 0, volume = 0;
   for (Index p = run.first; p < run.last; ++p)
@@ -61,16 +71,36 @@ void add_run(const Mesh<D>& mesh, const MaterialPoints<D>& points, const Run& ru
   // a vertex without mass stands still, which would strain the cell
   const bool is_strained =
       rayleigh.stiffness > 0 && std::ranges::none_of(nodes, [&](Index i) { return is_light(field, i); });
-  Working<G> stress{};
   if (is_strained)
-    stress = viscous_stress<G>(mesh, field, run.cell, mean_moduli(points, run), rayleigh.stiffness * volume);
+  {
+    const Working<G> own =
+        viscous_stress<G>(mesh, field, run.cell, mean_moduli(points, run), rayleigh.stiffness * volume);
+    for (std::size_t s = 0; s < own.size(); ++s)
+      stress[run.cell][s] += own[s];
+  }
   for (int k = 0; k <= D; ++k)
   {
-    const Vector<D> viscous = internal_force<G>(stress, shape, k), &velocity = field.start_velocity[nodes[k]];
+    const Vector<D>& velocity = field.start_velocity[nodes[k]];
     const double of_node = mass / moments.mass * at_vertex<D>(moments.mass, moments.mass_xi, shape.gradient[k]);
     for (int a = 0; a < D; ++a)
-      field.damping_force[nodes[k]][a] -= viscous[a] + rayleigh.mass * of_node * velocity[a];
+      field.damping_force[nodes[k]][a] -= rayleigh.mass * of_node * velocity[a];
   }
+}
+
+/// Adds the forces of the cells' stresses to their nodes.
+/// @note Collective with nodal mixed discretisation
+template <class G, int D = G::dim>
+void add_stress_forces(Model<G>& model, std::vector<Working<G>>& stress, VelocityField<G>& field)
+{
+  if (is_averaged(field))
+    average_stresses<G>(model.mesh, model.exchange, field, stress);
+  for (Index c : field.part.cells)
+    for (int k = 0; k <= D; ++k)
+    {
+      const Vector<D> viscous = internal_force<G>(stress[c], model.mesh.shapes[c], k);
+      for (int a = 0; a < D; ++a)
+        field.damping_force[model.mesh.cells[c][k]][a] -= viscous[a];
+    }
 }
 } // namespace
 
@@ -82,10 +112,15 @@ void add_rayleigh_forces(Model<G>& model, const Rayleigh& rayleigh, VelocityFiel
   if (rayleigh.mass == 0 && rayleigh.stiffness == 0)
     return;
   field.damping_force.assign(field.nodes.size(), {});
+  if (rayleigh.stiffness > 0 && is_averaged(field))
+    average_strains(model.mesh, model.exchange, field.start_velocity, 1.0, field); // rates
+  std::vector<Working<G>> stress(static_cast<std::size_t>(model.mesh.owned_cells));
   for (const MaterialPoints<D>& points : {material_points(model), resting_points(model)})
     for (const Run& run : points.runs)
       if (&field_of(model, run.material) == &field)
-        add_run<G>(model.mesh, points, run, rayleigh, field);
+        add_run<G>(model.mesh, points, run, rayleigh, stress, field);
+  if (rayleigh.stiffness > 0)
+    add_stress_forces(model, stress, field);
   sum_shared(model.exchange, field.damping_force);
   for (Index i : field.part.nodes)
     for (int a = 0; a < D; ++a)

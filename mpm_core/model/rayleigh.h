@@ -19,7 +19,9 @@ struct Rayleigh
 double damped_time_step(const Rayleigh& rayleigh, double critical);
 
 /// Adds the forces - alpha m_i v_i - sum V_c beta (lambda tr(d) 1 + 2 mu d) grad N_i, with the strain rate d of the
-/// velocities at the start, to the tractions at the nodes of a field.
+/// velocities at the start, to the tractions at the nodes of a field. With nodal mixed discretisation the rates and the
+/// forces are averaged as those of the elastic stresses are: otherwise isochoric motion would be damped as in cells
+/// that lock, by the stiffness of the water where soil is undrained.
 /// @pre nodes have the sums of all ranks, and velocities at the start
 /// @note Collective
 template <class G>
