@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from . import _core
 
@@ -30,6 +31,9 @@ STEEPEST_FRICTION = 2.0
 ODD_WATER = (0.1, 200.0, 5000.0)
 """Densities [kg/m3] between the first two and above the last are probably those of water in other units, or under another gravity"""
 
+CUT_MOTION = 0.05
+"""Fraction of the largest velocity of a motion at its ends above which it is probably cut off"""
+
 NEARLY_INCOMPRESSIBLE = 0.45
 """Poisson's ratio above which linear cells lock"""
 
@@ -38,10 +42,57 @@ def warn_of_setup(model: Model, nmd: bool) -> None:
     """Warn of probable mistakes in the input. Collective."""
     locks = "" if nmd else locking(model.laws)
     of_loads = _nothing_acts(model), _nothing_holds(model), _upwards(model), _weight(model) or _softness(model)
-    found = [text for text in (*of_loads, angles_in_radians(model.laws), locks, *_reversed_interfaces(model)) if text]
+    of_sides = *_held_sides(model), *_cut_motion(model), *_reversed_interfaces(model)
+    found = [text for text in (*of_loads, angles_in_radians(model.laws), locks, *of_sides) if text]
     if model.comm.rank == 0:
         for text in found:
             warnings.warn(text, RuntimeWarning, stacklevel=3)
+
+
+def _held_sides(model: Model) -> Iterator[str]:
+    """Of sides that absorb or let a wave in, those whose own boundary conditions leave no motion to them, or none along the wave."""
+    names = {tag: name for name, tags in model.mesh.names["facet"].items() for tag in tags}
+    wave = np.array(model._incoming[2]) if model._incoming else None
+    for tag, *_, beside in model._absorbing:
+        held = [_held_directions(condition) for condition in model._conditions if condition[0] == tag]
+        rank = _rank([np.zeros((1, model.mesh.dim)), *held])
+        if beside < 0 and wave is not None and _rank([wave, *held]) == rank:
+            yield (
+                f"the wave does not enter through the side {names.get(tag, tag)!r}: boundary conditions of the same facets hold it along "
+                f"{wave}, the direction of the wave; release them (model.release)"
+            )
+        elif rank == model.mesh.dim:
+            yield (
+                f"the side {names.get(tag, tag)!r} absorbs nothing: boundary conditions of the same facets hold it; release them "
+                "(model.release)"
+            )
+
+
+def _held_directions(condition: tuple[int, bool, list[float | None]]) -> NDArray[np.float64]:
+    """Directions along which a boundary condition holds its nodes, one per row."""
+    _, whole, vector = condition
+    if whole:
+        return np.eye(len(vector))[[value is not None for value in vector]]
+    return np.array([vector], dtype=float) / np.linalg.norm(np.array(vector, dtype=float))
+
+
+def _rank(directions: Sequence[NDArray[np.float64]]) -> int:
+    """Number of independent directions among unit vectors."""
+    return int(np.linalg.matrix_rank(np.vstack(directions), tol=1e-9))
+
+
+def _cut_motion(model: Model) -> Iterator[str]:
+    """Of an incoming motion that is cut off at speed."""
+    if not model._incoming:
+        return
+    velocity = np.array(model._incoming[1])
+    largest = np.abs(velocity).max()
+    for what, end in (("begins", velocity[0]), ("ends", velocity[-1])):
+        if abs(end) > CUT_MOTION * largest:
+            yield (
+                f"the motion that enters {what} at {abs(end) / largest:.0%} of its largest velocity, and is zero beyond, which is a "
+                "blow: bring its velocity to zero at its ends, as by a baseline correction and a taper"
+            )
 
 
 def _reversed_interfaces(model: Model) -> list[str]:

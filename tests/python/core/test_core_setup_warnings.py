@@ -113,3 +113,47 @@ def test_soil_that_keeps_its_volume_as_it_fails_is_named_unless_strains_are_aver
     assert reports[-1].plastic_work > 0.3 * reports[-1].energy_scale
     said = [str(each.message) for each in caught if "the soil fails" in str(each.message)]
     assert len(said) == (dilation_angle == 0 and not nmd)
+
+
+def shaken(hold, motion=((0.0, 1.0, 2.0), (0.0, 1e-3, 0.0)), let_in="shake", direction=(1, 0)):
+    """Warnings of a model whose base, the facets of tag 3, lets a wave in and has further boundary conditions."""
+    model = mpm.Model(box([2, 2]), mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed(density=2000.0, per_cell=3)
+    hold(model)
+    if let_in == "drive":
+        model.drive(3, mpm.Motion(*motion), direction)
+    else:
+        model.absorb(3)
+    if let_in == "shake":
+        model.shake(mpm.Motion(*motion), direction)
+    return said(model)
+
+
+@pytest.mark.parametrize("let_in", ["shake", "drive"])
+def test_a_wave_that_boundary_conditions_keep_out_is_told(let_in):
+    for hold in (
+        lambda model: model.fix(3),
+        lambda model: model.roller(3, (2, 0)),
+        lambda model: model.prescribe(3, (0.0, None)),
+    ):
+        assert any("the wave does not enter through the side 3" in text for text in shaken(hold, let_in=let_in))
+    oblique = {"direction": (1, 1), "let_in": let_in}
+    assert (
+        any("does not enter" in text for text in shaken(lambda model: rollers(model, axes=(0, 1)), **oblique)) is False
+    )
+    assert any("does not enter" in text for text in shaken(lambda model: model.fix(3), **oblique))
+    for hold in (lambda model: model.roller(3, (0, 1)), lambda model: model.fix(1), lambda model: None):
+        assert shaken(hold, let_in=let_in) == []
+
+
+def test_a_side_that_is_held_and_absorbs_is_told():
+    model_says = shaken(lambda model: model.fix(3), let_in=None)
+    assert any("the side 3 absorbs nothing" in text for text in model_says)
+    assert not any("absorbs nothing" in text for text in shaken(lambda model: model.roller(3, (1, 0)), let_in=None))
+
+
+def test_a_motion_that_is_cut_off_is_told():
+    free = lambda model: None  # noqa: E731
+    assert any("ends at 100% of its" in text for text in shaken(free, motion=((0.0, 1.0), (0.0, 1e-3))))
+    assert any("begins at 6% of its" in text for text in shaken(free, motion=((0.0, 1.0, 2.0), (-6e-5, 1e-3, 0.0))))
+    assert shaken(free, motion=((0.0, 1.0, 2.0), (4e-5, 1e-3, -4e-5))) == []
