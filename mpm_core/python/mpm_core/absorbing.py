@@ -10,7 +10,7 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike
 
 from ._core import InputError
-from .checks import positive
+from .checks import flag, positive
 from .collective import collectively
 from .free_field import layers_at
 from .ground_column import Base, GroundColumn, Layers
@@ -82,6 +82,7 @@ class AbsorbingSides:
                     positive("impedances[0]", given[0], "kg/(m2 s)"),
                     positive("impedances[1]", given[1], "kg/(m2 s)"),
                 )
+            flag("free_field", free_field)
             return [(tag, *pair, far) for tag in self.mesh.tags_of("facet", facet_tag)]
 
         new = collectively(self.comm, checked)

@@ -56,8 +56,7 @@ class Rayleigh:
         Raises:
             InputError: a ratio out of its range, frequencies that are not positive.
         """
-        if not 0 <= ratio < 1:
-            raise InputError(f"ratio is {ratio}, expected 0 <= ratio < 1")
+        within("ratio", ratio, 0, 1, open_above=True)
         pair = floats("frequencies", frequencies, (2,)).tolist()
         one, other = (2 * np.pi * positive("frequencies", frequency, "Hz") for frequency in pair)
         return cls(2 * ratio * one * other / (one + other), 2 * ratio / (one + other), plastic_strain)

@@ -133,6 +133,7 @@ def test_soil_that_has_yielded_is_not_damped():
         (lambda: mpm.Rayleigh(mass=-1.0), "mass is -1.0 1/s, expected a number not below zero"),
         (lambda: mpm.Rayleigh(stiffness=np.nan), "stiffness is nan s"),
         (lambda: mpm.Rayleigh.of_ratio(1.5, (1.0, 2.0)), "ratio is 1.5, expected 0 <= ratio < 1"),
+        (lambda: mpm.Rayleigh.of_ratio("2 %", (1.0, 2.0)), "ratio is '2 %', expected a number"),
         (lambda: mpm.Rayleigh.of_ratio(0.1, (0.0, 2.0)), "frequencies is 0.0 Hz, expected a positive number"),
         (lambda: shear_bar().explicit(1.0, rayleigh=0.05), "rayleigh is 0.05, expected a Rayleigh or None"),
     ],
