@@ -1,10 +1,11 @@
 """A slope of loose saturated sand loses its strength and runs out as a flow slide.
 
 The slope is saturated up to its surface and rests under its weight. At the start the pore pressures of the loose sand rise by
-a fraction of the effective vertical stresses, as in an earthquake, and effective stresses decrease by the same amount. Soil
-and water then move with separate velocities. Fine sand hardly drains while it flows; coarse sand drains as fast as it flows.
+a fraction of the effective vertical stresses, as in an earthquake, and effective normal stresses fall by this fraction. Shear
+stresses stay, which equilibrium asks for, as far as the strength that is left carries them. Soil and water then move with separate
+velocities. Fine sand hardly drains while it flows; coarse sand drains as fast as it flows.
 
-As long as its pores are full, the sand keeps its volume (`volume_gain`) and flows out to a slope of some 4 degrees. Loose sand
+As long as its pores are full, the sand keeps its volume (`volume_gain`) and flows out to a slope of some 5 degrees. Loose sand
 would contract and flow further, so that the run-out is a lower bound; dense sand would stop earlier. Use `--air-entry 0` for
 sand so coarse that it sustains no suction: it dilates where effective stresses would become tensile, and its pores empty.
 """
@@ -134,7 +135,10 @@ def raise_pressures(a: Namespace, model: mpm.Model) -> None:
     p.set("initial_position", p.position)  # displacements count from here
     raised = np.maximum(-a.pressure_ratio * p.stress[:, 1], 0.0)
     p.set("pore_pressure", p.pore_pressure + raised)
-    p.set("stress", p.stress + raised[:, None] * np.array([1.0, 1.0, 1.0, 0.0]))
+    left = 1 - a.pressure_ratio * np.array(
+        [1.0, 1.0, 1.0, 0.0]
+    )  # the same decrease of all would end in tension to the sides
+    p.set("stress", left * p.stress)
 
 
 # --- 3. The slide ----------------------------------------------------------------------------------------------------

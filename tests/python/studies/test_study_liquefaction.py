@@ -32,3 +32,21 @@ def test_fine_sand_flows_without_losing_water_or_gaining_volume_and_farther_than
     assert fine["crest_settlement_m"] > 1.3 * coarse["crest_settlement_m"]
     held = slid(tmp_path / "held", "--pressure-ratio", "0")
     assert abs(held["crest_settlement_m"]) < 0.01 and abs(held["runout_m"]) < 0.01
+
+
+def test_the_ground_keeps_the_fraction_of_its_effective_stress_that_pore_pressures_leave():
+    # Almost level ground whose pore pressures rise by 0.7 of the effective vertical stress keeps 0.3 of it, and half of this to its
+    # sides, below its strength (K = 0.5 > (1 - sin 33) / (1 + sin 33) = 0.29): it does not liquefy, and its weight is still carried.
+    a = study.parse(["--cell-size", "0.5", "--pressure-ratio", "0.7", "--angle", "2", "--runout", "2"])
+    model = study.build(a)
+
+    def over_vertical(model):
+        p = model.particles
+        depth = study.depth(a, p.position)
+        buoyant = (study.density(a) - study.WATER) * study.GRAVITY * depth
+        excess = p.pore_pressure - study.WATER * study.GRAVITY * depth
+        return [np.mean((values / buoyant)[depth > 1.0]) for values in (-p.stress[:, 1], -p.stress[:, 0], excess)]
+
+    assert over_vertical(model) == pytest.approx([0.3, 0.15, 0.7], abs=0.005)
+    model.explicit(0.02, nmd=True).last()
+    assert over_vertical(model)[:2] == pytest.approx([0.3, 0.15], abs=0.02)
