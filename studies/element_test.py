@@ -10,9 +10,10 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 import numpy as np
+from common.checks import check_effect
 from common.figures import curve_figure
 from common.history import History
-from common.options import add_choice, add_count, add_number, study_parser
+from common.options import add_choice, add_count, add_number, check, study_parser
 from common.ranks import run_study
 from common.results import open_results
 from common.slope_case import add_soil_options
@@ -37,9 +38,24 @@ def parser() -> ArgumentParser:
     add_number(p, "--pressure", 20e3, "Pa", "isotropic pressure at the start", at_least=0)
     add_number(p, "--strain", 0.2, "-", "axial strain to reach (shear strain in simple shear), in compression", above=0)
     add_count(p, "--steps", 400, "increments")
+    add_number(p, "--rate", None, "1/s", "rate of this strain, for laws that depend on time; without one the test is infinitely "
+               "slow", above=0)  # fmt: skip
     add_soil_options(p, dilation_angle=0.0)
     add_law_options(p)
     return p
+
+
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = parser()
+    a = p.parse_args(arguments)
+    check_law_options(p, a)
+    own = bool(a.python_law or a.umat)
+    check_effect(
+        p, a, own or a.material == "viscoplastic", ("--rate",), "--material viscoplastic, --python-law or --umat"
+    )
+    check(p, own or a.material != "viscoplastic" or a.rate is not None,
+          "--material is viscoplastic, expected --rate with it: in an infinitely slow test the viscosity has no effect")  # fmt: skip
+    return a
 
 
 # --- 2. The test -----------------------------------------------------------------------------------------------------
@@ -72,9 +88,10 @@ def row(test: mpm.ElementTest) -> dict[str, float]:
 def run(test: mpm.ElementTest, a: Namespace, history: History) -> str | None:
     """Apply all increments; returns why the test ended early, if it did."""
     history.add(**row(test))
+    size = a.strain / a.steps
     for _ in range(a.steps):
         try:
-            test.step(increment(a.test, a.strain / a.steps))
+            test.step(increment(a.test, size), dt=np.inf if a.rate is None else size / a.rate)
         except mpm.RunError as error:
             return str(error)
         history.add(**row(test))
@@ -118,9 +135,7 @@ def draw(history: History, a: Namespace, path: Path) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    p = parser()
-    a = p.parse_args(arguments)
-    check_law_options(p, a)
+    a = parse(arguments)
     law = law_of(a)
     folder = open_results(a)
     test = mpm.ElementTest(law, [-a.pressure] * 3 + [0.0] * 3)

@@ -40,6 +40,26 @@ def test_undrained_triaxial_test_of_cam_clay_ends_at_the_critical_state(tmp_path
         assert end["q_Pa"] == pytest.approx(end["p_Pa"], rel=1e-2)
 
 
+def test_viscous_soil_in_simple_shear_has_the_stress_of_its_rate(tmp_path):
+    # Bingham's fluid: tau = c + viscosity times rate, once the overstress has grown over many times viscosity / G
+    mud = [
+        "--material",
+        "viscoplastic",
+        "--test",
+        "shear",
+        "--cohesion",
+        "2e3",
+        "--friction-angle",
+        "0",
+        "--viscosity",
+        "5e3",
+    ]
+    for rate in (0.01, 1.0):
+        result = study("element_test", tmp_path / str(rate), *mud, "--strain", "2", "--rate", str(rate))
+        assert result.returncode == 0, result.stderr
+        assert summary(tmp_path / str(rate))["shear_stress_Pa"] == pytest.approx(2e3 + 5e3 * rate, rel=1e-6)
+
+
 def test_a_law_of_ones_own(tmp_path):
     (tmp_path / "mine.py").write_text(
         "class Spring:\n"
@@ -61,7 +81,8 @@ def test_a_law_of_ones_own(tmp_path):
     "options, named",
     [(["--material", "marble"], "--material is 'marble', expected one of"), (["--poisson", "0.6"], "--poisson is '0.6'"),
      (["--material", "cam-clay", "--swelling-slope", "0.2"], "compression = 0.1"), (["--python-law", "no.py:X"], "no.py:X"),
-     (["--umat", "no.so"], "no.so")],
+     (["--umat", "no.so"], "no.so"), (["--material", "viscoplastic"], "--material is viscoplastic, expected --rate with it"),
+     (["--rate", "1"], "--rate is given, expected --material viscoplastic")],
 )  # fmt: skip
 def test_bad_options_are_named(tmp_path, options, named):
     result = study("element_test", tmp_path, *options)
