@@ -115,7 +115,7 @@ class AbsorbingSides:
             direction: in which the ground moves, shape (D,), of any length.
 
         Raises:
-            InputError: on all ranks: no side absorbs; a direction without length; something else than a motion.
+            InputError: on all ranks: no side absorbs, or none without a free field; a direction without length; something else than a motion.
         """
         self._let_in(motion, direction, 1.0)
 
@@ -157,6 +157,11 @@ class AbsorbingSides:
         unit = self._checked_wave(motion, direction)
         if not self._absorbing:
             raise InputError("no side absorbs, expected a call of absorb before shake")
+        if all(side[4] != WAVE for side in self._absorbing):
+            raise InputError(
+                "all sides that absorb have free fields beside them, expected a call of absorb for the base, through which the wave "
+                "comes in, before shake"
+            )
         if self._columns:
             raise InputError(
                 "free fields have begun to move, expected shake before the run, or absorb for these sides again"

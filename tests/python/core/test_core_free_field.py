@@ -189,6 +189,10 @@ def sloping_side():
         (lambda model: model.absorb(LEFT, free_field=True) or model.explicit(1.0, damping=0.1), "damping is 0.1 with free"),
         (lambda model: model.absorb(BASE) or model.drive(LEFT, pulse(1.0), (1, 0)), r"sides \[3\] absorb and let waves in"),
         (lambda model: model.drive(BASE, 1.0, (1, 0)), "motion is 1.0, expected a Motion"),
+        (
+            lambda model: model.fix(BASE) or model.absorb(LEFT, free_field=True) or model.shake(pulse(1.0), (1, 0)),
+            "all sides that absorb have free fields",
+        ),
         (lambda model: model.drive(BASE, pulse(1.0), (0, 0)), "length of direction is 0.0"),
     ],
 )  # fmt: skip
