@@ -168,6 +168,7 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
   {
     if (done % control_interval == 0)
     {
+      note_largest_work(model);
       if (run.conversion)
         convert_failing(model, *run.conversion);
       const double critical = critical_time_step(model);
@@ -257,11 +258,8 @@ template <class G>
 std::array<double, 6> energy_scales(const Model<G>& model, double kinetic, double stored)
 {
   const EnergyBook& book = model.energy;
-  return {std::isnan(stored) ? 0 : stored,
-          model.totals.external_work + model.totals.support_work - book.external_start,
-          book.stress_work - book.stress_start,
-          kinetic,
-          book.kinetic_start,
+  const auto [external, of_stresses] = works_so_far(model);
+  return {std::isnan(stored) ? 0 : stored, external, of_stresses, kinetic, book.kinetic_start,
           book.pic_loss - book.pic_start};
 }
 } // namespace
@@ -310,6 +308,7 @@ Diagnostics diagnostics(const Model<G>& model)
   std::copy_n(sums.begin(), sums.size(), &d.particles);
   d.plastic_fraction = d.particles > 0 ? d.plastic_fraction / d.particles : 0;
   d.unexplained_energy += std::min(0.0, scales.back()); // what a transfer of velocities generates
+  d.energy_scale = model.energy.largest_work;
   for (double scale : scales)
     d.energy_scale = std::max(d.energy_scale, std::abs(scale));
   d.unbalanced_ratio = out_of_balance(model, gravity_at(model, model.time));

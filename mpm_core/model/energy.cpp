@@ -4,6 +4,7 @@
 #include "model/model.h"
 #include "transfer/resting.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace mpm::model
@@ -105,6 +106,22 @@ double energy_balance(const Model<G, D>& model, double kinetic)
 }
 
 template <class G, int D>
+std::array<double, 2> works_so_far(const Model<G, D>& model)
+{
+  return {model.totals.external_work + model.totals.support_work - model.energy.external_start,
+          model.energy.stress_work - model.energy.stress_start};
+}
+
+template <class G, int D>
+void note_largest_work(Model<G, D>& model)
+{
+  std::array<double, 2> works = works_so_far(model);
+  MPI_Allreduce(MPI_IN_PLACE, works.data(), 2, MPI_DOUBLE, MPI_SUM, model.exchange.comm);
+  for (double work : works)
+    model.energy.largest_work = std::max(model.energy.largest_work, std::abs(work));
+}
+
+template <class G, int D>
 void start_energy_balance(Model<G, D>& model)
 {
   EnergyBook& book = model.energy;
@@ -116,6 +133,7 @@ void start_energy_balance(Model<G, D>& model)
   book.external_start = model.totals.external_work + model.totals.support_work;
   book.stress_start = book.stress_work;
   book.pic_start = book.pic_loss;
+  book.largest_work = 0;
   book.stale = false;
 }
 
@@ -124,6 +142,8 @@ void start_energy_balance(Model<G, D>& model)
   template ParticleEnergy particle_energy(const Model<G>&, Index);                                                     \
   template ParticleEnergy particle_energy(const Model<G>&);                                                            \
   template double energy_balance(const Model<G>&, double);                                                             \
+  template std::array<double, 2> works_so_far(const Model<G>&);                                                        \
+  template void note_largest_work(Model<G>&);                                                                          \
   template void start_energy_balance(Model<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

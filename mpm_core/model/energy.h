@@ -15,7 +15,7 @@
 
 namespace mpm::model
 {
-/// Sums over this rank [J].
+/// Sums over this rank, except for the largest work [J].
 struct EnergyBook
 {
   double stress_work = 0;     ///< of the particles' stresses on their strains since the model was made
@@ -30,6 +30,7 @@ struct EnergyBook
   double external_start = 0; ///< likewise, external and support work
   double stress_start = 0;   ///< likewise, stress_work
   double pic_start = 0;      ///< likewise, pic_loss
+  double largest_work = 0;   ///< of external and support work, or of stress work, since then, over all ranks
   bool stale = true;         ///< the particles have been changed since
 };
 
@@ -57,6 +58,15 @@ Vector<G::dim> particle_momentum(const Model<G, D>& model, Index p);
 /// Works that came in less those that went out or are stored, at the particles; constant in an exact motion [J].
 template <class G, int D>
 double energy_balance(const Model<G, D>& model, double kinetic);
+
+/// External and support work, and stress work, since the balance began, of this rank [J].
+template <class G, int D>
+std::array<double, 2> works_so_far(const Model<G, D>& model);
+
+/// Updates the largest work: waves that leave through absorbing sides take it out again.
+/// @note Collective
+template <class G, int D>
+void note_largest_work(Model<G, D>& model);
 
 /// Resets the balance to the present particles.
 template <class G, int D>

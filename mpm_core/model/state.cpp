@@ -96,6 +96,7 @@ void for_each_number(M& model, F&& f)
   f("energy_start_external_work", Kind::sum, model.energy.external_start);
   f("energy_start_stress_work", Kind::sum, model.energy.stress_start);
   f("energy_start_pic_loss", Kind::sum, model.energy.pic_start);
+  f("energy_largest_work", Kind::common, model.energy.largest_work);
   f("plastic_particles", Kind::sum, model.last.plastic);
   if (model.water)
   {

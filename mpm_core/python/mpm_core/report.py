@@ -55,8 +55,8 @@ class Report:
     the discretisation generates (negative) or dissipates (positive), since the particles were last changed by anything but a step
     with inertia or flow"""
     energy_scale: float
-    """Largest of external and support work and stress work over the same time, stored energy, and kinetic energy at the start
-    and now"""
+    """Largest of external and support work and stress work so far over the same time, stored energy, and kinetic energy at the
+    start and now"""
     plastic_fraction: float
     """Fraction of the particles that yielded in the last step"""
     resting_cells: int
