@@ -31,6 +31,9 @@ STEEPEST_FRICTION = 2.0
 ODD_WATER = (0.1, 200.0, 5000.0)
 """Densities [kg/m3] between the first two and above the last are probably those of water in other units, or under another gravity"""
 
+RETURNED = 0.01
+"""Fraction of a stress by which an update without strain changes it, above which it is probably beyond the yield surface by mistake"""
+
 CUT_MOTION = 0.05
 """Fraction of the largest velocity of a motion at its ends above which it is probably cut off"""
 
@@ -42,8 +45,9 @@ def warn_of_setup(model: Model, nmd: bool) -> None:
     """Warn of probable mistakes in the input. Collective."""
     locks = "" if nmd else locking(model.laws)
     of_loads = _nothing_acts(model), _nothing_holds(model), _upwards(model), _weight(model) or _softness(model)
+    of_laws = angles_in_radians(model.laws), _beyond_preconsolidation(model), locks
     of_sides = *_held_sides(model), *_cut_motion(model), *_reversed_interfaces(model)
-    found = [text for text in (*of_loads, angles_in_radians(model.laws), locks, *of_sides) if text]
+    found = [text for text in (*of_loads, *of_laws, *of_sides) if text]
     if model.comm.rank == 0:
         for text in found:
             warnings.warn(text, RuntimeWarning, stacklevel=3)
@@ -178,6 +182,30 @@ def _softness(model: Model) -> str:
     return (
         f"the soil is so soft that its own weight would compress it to nothing: its oedometric modulus is {modulus:.4g} Pa at most, "
         f"and the weight above its base {stress:.4g} Pa; moduli are in Pa"
+    )
+
+
+def _beyond_preconsolidation(model: Model) -> str:
+    """Of clay that has never been loaded as the stresses say that it is, before the first step, which would reduce them."""
+    if model.steps > 0:
+        return ""
+    p, outside, total = model.particles, 0, 0
+    for number, law in enumerate(model.laws):
+        rows = p.material == number
+        if not (rows.any() and any(isinstance(each, _core.CamClay) for each in with_inner_laws(law))):
+            continue
+        stress = p.stress[rows]
+        returned = stress.copy()
+        law.update(np.zeros_like(stress), returned, np.ascontiguousarray(p.state[rows, : law.n_state]))
+        change = np.linalg.norm(returned - stress, axis=1)
+        outside += int(np.count_nonzero(change > RETURNED * np.linalg.norm(stress, axis=1)))
+        total += len(stress)
+    outside, total = model.comm.allreduce(np.array([outside, total]))
+    if not outside:
+        return ""
+    return (
+        f"stresses of {outside / total:.1%} of the particles of CamClay lie beyond their preconsolidation pressure; the first step reduces "
+        'them to it. Set it by model.set_state("log_preconsolidation", mpm.log_preconsolidation(law, stress, overconsolidation))'
     )
 
 

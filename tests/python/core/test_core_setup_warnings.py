@@ -3,6 +3,7 @@
 import re
 import warnings
 
+import numpy as np
 import pytest
 from core_cases import box, rollers
 
@@ -157,3 +158,21 @@ def test_a_motion_that_is_cut_off_is_told():
     assert any("ends at 100% of its" in text for text in shaken(free, motion=((0.0, 1.0), (0.0, 1e-3))))
     assert any("begins at 6% of its" in text for text in shaken(free, motion=((0.0, 1.0, 2.0), (-6e-5, 1e-3, 0.0))))
     assert shaken(free, motion=((0.0, 1.0, 2.0), (4e-5, 1e-3, -4e-5))) == []
+
+
+@pytest.mark.parametrize(
+    "wrapped", [lambda law: law, mpm.Hencky, lambda law: mpm.Undrained(law, water_modulus=1e7, porosity=0.5)]
+)
+@pytest.mark.parametrize("pressure, known, warned", [(99e3, 1.0, False), (300e3, 3.0, False), (300e3, 1.0, True)])
+def test_clay_with_stresses_beyond_its_preconsolidation_is_told(wrapped, pressure, known, warned):
+    # A preconsolidation pressure of 100 kPa, or of `known` times that: an isotropic pressure beyond it cannot be carried.
+    clay = mpm.CamClay(
+        compression=0.2, swelling=0.04, critical_slope=1.0, poisson=0.25, preconsolidation=100e3, void_ratio=1.0
+    )
+    model = model_of(wrapped(clay), gravity=0.0)
+    model.particles.set("stress", np.tile([-pressure] * 3 + [0.0], (len(model.particles), 1)))
+    model.set_state("log_preconsolidation", np.full(len(model.particles), np.log(known)))
+    told = [text for text in said(model) if "100.0% of the particles of CamClay lie beyond" in text]
+    assert bool(told) == warned
+    kept = model.particles.stress[:, 1].mean() / -pressure  # of the total stress; without strain, but for the return
+    assert warned == (kept < 0.99)
