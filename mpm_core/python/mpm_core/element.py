@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._core import InputError, RunError
-from .checks import positive
+from ._core import InputError, RunError, law_types
+from .checks import positive, within
 from .mesh import floats
 
 MAX_ITERATIONS = 50
@@ -33,6 +33,8 @@ class ElementTest:
     def __init__(
         self, law: Any, stress: ArrayLike, state: ArrayLike | None = None, cell_size: float | None = None
     ) -> None:
+        if not isinstance(law, tuple(law_types)):
+            raise InputError(f"law is {law!r}, expected a constitutive law such as MohrCoulomb(...)")
         self.law = law
         self.time = 0.0
         """Time [s]"""
@@ -59,12 +61,14 @@ class ElementTest:
             dt: duration of the increment [s]; by default loading is infinitely slow.
 
         Raises:
+            InputError: another number of components, or such as are neither numbers nor None; a duration below zero.
             RunError: the law failed, or no strain gives the stresses; the message has the increment. The point is unchanged.
         """
-        if not dt >= 0:
-            raise InputError(f"dt is {dt} s, expected at least 0")
-        self._dt = dt
-        increment = np.array(strain_increment, dtype=float)
+        self._dt = within("dt", dt, 0, np.inf)
+        try:
+            increment = np.array(strain_increment, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"strain_increment is {strain_increment!r}, expected numbers, or None") from None
         if increment.shape != self.stress.shape:
             raise InputError(f"strain_increment has shape {increment.shape}, expected {self.stress.shape}")
         free = np.isnan(increment)

@@ -136,3 +136,22 @@ def test_a_python_law_is_told_the_same():
     (_, _, _, _), (time, dt, size, deformation) = seen[-2:]
     assert (time, dt) == (0.01, 0.01) and size == pytest.approx(np.full(6, 0.5))
     assert deformation == pytest.approx(np.tile([[1, 0.01 * 0.04], [0, 1 - 0.01 * 0.06]], (6, 1, 1)))
+
+
+@pytest.mark.parametrize(
+    "step, text",
+    [
+        (lambda: mpm.ElementTest(3.0, [0.0] * 6), r"law is 3.0, expected a constitutive law"),
+        (lambda: element().step([0.0] * 5 + ["much"]), "strain_increment is .*, expected numbers, or None"),
+        (lambda: element().step([0.0] * 6, dt="1 s"), "dt is '1 s', expected a number"),
+        (lambda: element().step([0.0] * 6, dt=-1.0), "dt is -1.0, expected 0 <= dt <= inf"),
+        (lambda: element().step([0.0] * 6, dt=np.nan), "dt is nan, expected 0 <= dt <= inf"),
+    ],
+)
+def test_bad_input_of_an_element_test_is_named(step, text):
+    with pytest.raises(mpm.InputError, match=text):
+        step()
+
+
+def element():
+    return mpm.ElementTest(mpm.LinearElastic(young=1e6, poisson=0.3), [0.0] * 6)
