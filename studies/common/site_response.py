@@ -10,6 +10,9 @@ import mpm_core as mpm
 
 UNDAMPED = mpm.Rayleigh()
 
+LEAST_ENERGY = 1e-4
+"""Fraction of the largest energy in a spectrum below which a ratio to it says nothing: a hundredth of the amplitude"""
+
 
 def amplification(
     frequency: np.ndarray,
@@ -60,7 +63,8 @@ def spectral_ratio(
         smoothing: width of the windows over which the energies of both are summed first [Hz]; 0 for none.
 
     Returns:
-        Frequencies in the band (k) [Hz] and the ratio there (k).
+        Frequencies in the band (k) [Hz] and the ratio there (k); NaN where the reference has next to no energy, so that what is
+        not linear in the other motion, or its end, would be taken for an amplification.
     """
     step = (time[-1] - time[0]) / (len(time) - 1)
     frequency = np.fft.rfftfreq(4 * len(time), step)
@@ -68,4 +72,5 @@ def spectral_ratio(
     width = max(1, round(smoothing / frequency[1]))
     energies = [np.convolve(energy, np.ones(width) / width, mode="same") for energy in energies]
     inside = (frequency >= band[0]) & (frequency <= band[1])
-    return frequency[inside], np.sqrt(energies[0][inside] / energies[1][inside])
+    moves = np.where(energies[1] > LEAST_ENERGY * energies[1].max(), energies[1], np.nan)
+    return frequency[inside], np.sqrt(energies[0][inside] / moves[inside])

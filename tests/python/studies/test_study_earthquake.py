@@ -132,3 +132,16 @@ def test_the_acceleration_of_a_motion_is_that_between_its_samples():
     middle, found = accelerations(np.array([0.0, 0.1, 0.2, 0.4]), np.array([0.0, 0.3, 0.3, 0.3]))
     np.testing.assert_allclose(middle, [0.05, 0.15, 0.3])
     np.testing.assert_allclose(found, [3.0, 0.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("smoothing", [0.0, 0.5])
+def test_a_motion_is_not_amplified_at_frequencies_that_the_reference_lacks(smoothing):
+    # A reference of 8 Hz under an envelope of 20 s, twice of which moves, with a little of a motion of 3 Hz
+    time = 0.01 * np.arange(2001)
+    envelope = np.sin(0.05 * np.pi * time) ** 4
+    reference = envelope * np.sin(16 * np.pi * time)
+    moved = 2 * reference + 1e-2 * envelope * np.sin(6 * np.pi * time)
+    frequency, ratio = spectral_ratio(time, moved, reference, (7.95, 8.05), smoothing)
+    np.testing.assert_allclose(ratio, 2.0, rtol=1e-3)
+    frequency, ratio = spectral_ratio(time, moved, reference, (1.0, 6.0), smoothing)
+    assert len(frequency) > 100 and np.isnan(ratio).all()
