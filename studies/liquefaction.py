@@ -135,9 +135,8 @@ def raise_pressures(a: Namespace, model: mpm.Model) -> None:
     p.set("initial_position", p.position)  # displacements count from here
     raised = np.maximum(-a.pressure_ratio * p.stress[:, 1], 0.0)
     p.set("pore_pressure", p.pore_pressure + raised)
-    left = 1 - a.pressure_ratio * np.array(
-        [1.0, 1.0, 1.0, 0.0]
-    )  # the same decrease of all would end in tension to the sides
+    # Each by its fraction: the same decrease of all would end in tension to the sides.
+    left = 1 - a.pressure_ratio * np.array([1.0, 1.0, 1.0, 0.0])
     p.set("stress", left * p.stress)
 
 
