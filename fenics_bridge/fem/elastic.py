@@ -12,7 +12,7 @@ from dolfinx.mesh import Mesh
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree
+from fenics_bridge.errors import agree, is_finite
 from fenics_bridge.fem.evaluate import evaluate_at
 from fenics_bridge.fem.fields import (
     assembled,
@@ -246,11 +246,11 @@ def _solved(space: Any, constraints: Any, tangent: Any, load: Any, internal: Any
 
 
 def _first_mistake(young: float, poisson: float, unit_weight: Any, degree: int) -> str | None:
-    if not (np.isfinite(young) and young > 0):
+    if not (is_finite(young) and young > 0):
         return f"young is {young!r} Pa, expected a positive number"
-    if not 0 <= poisson < 0.5:
+    if not (is_finite(poisson) and 0 <= poisson < 0.5):
         return f"poisson is {poisson!r}, expected at least 0 and below 0.5"
-    if not np.isfinite(unit_weight):
+    if not is_finite(unit_weight):
         return f"unit_weight is {unit_weight!r} N/m3, expected a finite number"
     if degree not in (1, 2):
         return f"degree is {degree!r}, expected 1 or 2"

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from mpm_core.checks import renamed
 from mpm_core.setup_warnings import warn_of_water_weight
 
-from fenics_bridge.errors import InputError, agree
+from fenics_bridge.errors import InputError, agree, is_finite
 from fenics_bridge.fem.k0 import Surface, surface_height
 from fenics_bridge.fem.supports import Support
 from fenics_bridge.types import Law, OfPosition
@@ -112,7 +112,7 @@ def hydrostatic(level: Surface, unit_weight: float = 9.81e3) -> OfPosition:
     Raises:
         InputError: unit_weight is negative or not finite.
     """
-    if not (np.isfinite(unit_weight) and unit_weight >= 0):
+    if not (is_finite(unit_weight) and unit_weight >= 0):
         raise InputError(f"unit_weight is {unit_weight!r} N/m3, expected a number from 0 on")
     warn_of_water_weight(MPI.COMM_WORLD, unit_weight)
     return lambda x: unit_weight * np.maximum(surface_height(level, x) - x[:, -1], 0.0)
@@ -259,7 +259,7 @@ def _wrong_value(stage: Stage, where: str) -> str | None:
             return f"{where}{name} is {getattr(stage, name)!r}, expected a function of positions"
     for name in ("unit_weight", "pressure"):
         for key, value in getattr(stage, name).items():
-            if not (np.isscalar(value) and np.isfinite(value)):
+            if not is_finite(value):
                 return f"{where}{name} is {value!r} for {key!r}, expected a finite number"
     for key, law in stage.law.items():
         if not isinstance(law, tuple(_core.law_types)):

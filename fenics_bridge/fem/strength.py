@@ -6,10 +6,9 @@ import math
 from collections.abc import Collection
 from typing import Any
 
-import numpy as np
 
 import mpm_core as mpm
-from fenics_bridge.errors import InputError
+from fenics_bridge.errors import InputError, is_finite
 from fenics_bridge.types import Laws
 from mpm_core import _core
 
@@ -38,9 +37,10 @@ def reduced_strength(law: Laws, factor: float, unreduced: Collection[int | str] 
         The reduced law, or laws by cell tag.
 
     Raises:
-        InputError: the factor is not positive, a tag has no law, no law is left to reduce, or the strength of a law is not known.
+        InputError: the factor is not positive, what is given is no law, a tag has no law, no law is left to reduce, or the
+            strength of a law is not known.
     """
-    if not (np.isfinite(factor) and factor > 0):
+    if not (is_finite(factor) and factor > 0):
         raise InputError(f"factor is {factor!r}, expected a positive number")
     if isinstance(law, dict):
         unknown = [tag for tag in unreduced if tag not in law]
@@ -54,6 +54,8 @@ def reduced_strength(law: Laws, factor: float, unreduced: Collection[int | str] 
         raise InputError(
             f"unreduced is {list(unreduced)} with one law for the whole body, expected laws by cell tag, of which some stay"
         )
+    if not isinstance(law, tuple(_core.law_types)):
+        raise InputError(f"law is {law!r}, expected a constitutive law such as MohrCoulomb(...), or laws by cell tag")
     return _core.reduced_strength(law, factor)
 
 

@@ -8,12 +8,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from mpm_core.collective import on_first_rank
 
-from fenics_bridge.errors import InputError, agree
+from fenics_bridge.errors import InputError, agree, is_finite
 from fenics_bridge.mesh import gmsh_reader
 from fenics_bridge.mesh.checks import check_cells_fit, check_conforming
 from fenics_bridge.mesh.gmsh_process import Limits, read_apart
@@ -122,7 +121,7 @@ def _constants(parameters: Mapping[str, float], text: Any, path: Path) -> str:
     for name, value in parameters.items():
         if not (name.isidentifier() and re.search(rf"\b{name}\b".encode(), text)):
             raise InputError(f"parameters: {str(path)!r} has no constant {name!r}")
-        if not np.isfinite(value):
+        if not is_finite(value):
             raise InputError(f"parameters: {name}={value!r}, expected a finite number")
         lines.append(f"{name} = {float(value)!r};\n")
     return "".join(lines)

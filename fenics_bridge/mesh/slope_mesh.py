@@ -11,7 +11,7 @@ from mpi4py import MPI
 from mpm_core.collective import on_first_rank
 from numpy.typing import NDArray
 
-from fenics_bridge.errors import InputError
+from fenics_bridge.errors import InputError, is_finite
 from fenics_bridge.mesh.gmsh_reader import gmsh, gmsh_message, gmsh_session
 from fenics_bridge.mesh.meshes import arrays_from_model
 from fenics_bridge.mesh.names import name_tags
@@ -90,13 +90,13 @@ def _checked(
     depth: Any,
 ) -> tuple[Any, ...]:
     for name, value in (("height", height), ("crest", crest), ("cell_size", cell_size), ("runout", runout)):
-        if not (np.isfinite(value) and value > 0):
+        if not (is_finite(value) and value > 0):
             raise InputError(f"{name} is {value!r} m, expected a positive length")
-    if not (np.isfinite(headroom) and headroom >= 0):
+    if not (is_finite(headroom) and headroom >= 0):
         raise InputError(f"headroom is {headroom!r} m, expected a length, zero or more")
-    if not (np.isfinite(depth) and depth >= 0):
+    if not (is_finite(depth) and depth >= 0):
         raise InputError(f"depth is {depth!r} m, expected a length, zero or more")
-    if not 0 < angle <= 90:
+    if not (is_finite(angle) and 0 < angle <= 90):
         raise InputError(f"angle is {angle!r} degrees, expected more than 0 and at most 90")
     if cell_size > min(height, crest):
         raise InputError(f"cell_size is {cell_size!r} m, expected at most the height {height} m and crest {crest} m")

@@ -9,7 +9,7 @@ from mpm_core.collective import on_first_rank
 from numpy.typing import NDArray
 
 import mpm_core as mpm
-from fenics_bridge.errors import InputError
+from fenics_bridge.errors import InputError, is_finite
 from fenics_bridge.terrain.raster import Raster
 
 THINNEST = 0.1
@@ -60,7 +60,7 @@ def _points(before: Any, rupture: Any, surface: Any, spacing: float) -> tuple[An
     """Places and volumes of the particles, and how far they were lifted at most."""
     if before.crs != rupture.crs:
         raise InputError(f"rupture is in {rupture.crs!r}, expected {before.crs!r} as the ground before the slide")
-    if not (np.isfinite(spacing) and spacing > 0):
+    if not (is_finite(spacing) and spacing > 0):
         raise InputError(f"spacing is {spacing!r} m, expected a positive length")
     low = np.maximum((before.x[0], before.y[0]), (rupture.x[0], rupture.y[0]))
     high = np.minimum((before.x[-1], before.y[-1]), (rupture.x[-1], rupture.y[-1]))

@@ -10,7 +10,7 @@ from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from mpm_core.collective import on_first_rank
 
-from fenics_bridge.errors import InputError
+from fenics_bridge.errors import InputError, is_finite
 from fenics_bridge.mesh.gmsh_reader import gmsh, gmsh_message, gmsh_session
 from fenics_bridge.mesh.meshes import arrays_from_model
 from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, empty_arrays
@@ -62,7 +62,7 @@ def terrain_mesh(
 
 def _check(ground: Any, cell_size: float, height: float, coarse: Any, below: Any, fine: Any) -> None:
     for name, value in (("cell_size", cell_size), ("height", height), ("coarse_size", coarse), ("depth", below)):
-        if not (np.isfinite(value) and value > 0):
+        if not (is_finite(value) and value > 0):
             raise InputError(f"{name} is {value!r} m, expected a positive length")
     if coarse < cell_size:
         raise InputError(f"coarse_size is {coarse!r} m, expected at least cell_size, {cell_size!r} m")

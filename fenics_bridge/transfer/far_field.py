@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import mpm_core as mpm
 from fenics_bridge import compat
-from fenics_bridge.errors import agree
+from fenics_bridge.errors import agree, is_finite
 from fenics_bridge.fem.fields import assembled, elastic_stress, strain
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held, require_same_geometry, weighted
 from fenics_bridge.fem.linear_solver import LinearSolver
@@ -261,11 +261,11 @@ class FarField:
 def _first_mistake(
     young: float, poisson: float, density: float, degree: int, supports: Sequence[Support]
 ) -> str | None:
-    if not (np.isfinite(young) and young > 0):
+    if not (is_finite(young) and young > 0):
         return f"young is {young!r} Pa, expected a positive number"
-    if not 0 <= poisson < 0.5:
+    if not (is_finite(poisson) and 0 <= poisson < 0.5):
         return f"poisson is {poisson!r}, expected at least 0 and below 0.5"
-    if not (np.isfinite(density) and density >= 0):
+    if not (is_finite(density) and density >= 0):
         return f"density is {density!r} kg/m3, expected a number not below zero"
     if isinstance(degree, bool) or degree != int(degree) or degree < 1:
         return f"degree is {degree!r}, expected a whole number from 1 on"

@@ -9,7 +9,7 @@ import numpy as np
 from dolfinx import fem
 from numpy.typing import ArrayLike, NDArray
 
-from fenics_bridge.errors import InputError, agree
+from fenics_bridge.errors import InputError, agree, is_finite
 from fenics_bridge.types import OfPosition
 
 
@@ -30,10 +30,10 @@ class Newmark:
     """Its part in the velocity [-]"""
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.gamma) and self.gamma >= 0.5):
+        if not (is_finite(self.gamma) and self.gamma >= 0.5):
             raise InputError(f"gamma is {self.gamma!r}, expected 0.5 or more")
         least = 0.25 * (self.gamma + 0.5) ** 2
-        if not (np.isfinite(self.beta) and self.beta >= least * (1 - 1e-12)):
+        if not (is_finite(self.beta) and self.beta >= least * (1 - 1e-12)):
             raise InputError(f"beta is {self.beta!r}, expected (gamma + 1/2)^2 / 4 = {least:g} or more")
 
 

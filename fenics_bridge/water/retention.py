@@ -20,7 +20,7 @@ import ufl
 from mpi4py import MPI
 from ufl.core.expr import Expr
 
-from fenics_bridge.errors import InputError
+from fenics_bridge.errors import InputError, is_finite
 
 LEAST_PERMEABILITY = 1e-8
 """Relative permeability that is left in the driest soil, so that the equations keep one solution."""
@@ -85,10 +85,10 @@ class VanGenuchten(_Curve):
     def __post_init__(self) -> None:
         _check_positive("alpha", self.alpha, "1/Pa")
         _warn_of_alpha(self.alpha)
-        if not (np.isfinite(self.n) and self.n > 1):
+        if not (is_finite(self.n) and self.n > 1):
             raise InputError(f"n is {self.n!r}, expected more than 1")
         _check_residual(self.residual)
-        if not (np.isfinite(self.air_entry) and self.air_entry >= 0):
+        if not (is_finite(self.air_entry) and self.air_entry >= 0):
             raise InputError(f"air_entry is {self.air_entry!r} Pa, expected 0 or more")
 
     def _powers(self, suction: Any) -> Any:
@@ -311,7 +311,7 @@ def _joined(x: Any, places: Any, values: Any) -> Any:
 
 
 def _check_positive(name: str, value: float, unit: str) -> None:
-    if not (np.isfinite(value) and value > 0):
+    if not (is_finite(value) and value > 0):
         raise InputError(f"{name} is {value!r} {unit}, expected a positive number")
 
 

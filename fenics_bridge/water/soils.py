@@ -54,7 +54,7 @@ def given_water(
         mistake = f"gravity is {gravity!r} m/s2, expected a positive number"
     elif not (is_finite(weight := WATER_DENSITY * gravity if unit_weight is None else unit_weight) and weight > 0):
         mistake = f"unit_weight is {unit_weight!r} N/m3, expected a positive number"
-    elif not (modulus > 0 and (infinite or is_finite(modulus))):
+    elif not ((is_finite(modulus) and modulus > 0) or (infinite and modulus == np.inf)):
         mistake = f"water_modulus is {modulus!r} Pa, expected a positive number{', or infinity' if infinite else ''}"
     agree(comm, mistake)
     warn_of_water_density(comm, weight / gravity, stacklevel=4)
@@ -131,10 +131,10 @@ def dipping(along: float, across: float, dip: float, direction: float | None = N
         InputError: a conductivity is not positive, or an angle is not finite.
     """
     for name, value in (("along", along), ("across", across)):
-        if not (np.isfinite(value) and value > 0):
+        if not (is_finite(value) and value > 0):
             raise InputError(f"{name} is {value!r} m/s, expected a positive number")
     for name, value in (("dip", dip), ("direction", 0.0 if direction is None else direction)):
-        if not np.isfinite(value):
+        if not is_finite(value):
             raise InputError(f"{name} is {value!r} degrees, expected a finite number")
     sine, cosine = np.sin(np.radians(dip)), np.cos(np.radians(dip))
     turned = None if direction is None else np.radians(direction)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from mpm_core.step_control import StepControl
 
 from fenics_bridge.errors import agree, is_finite
@@ -39,4 +38,4 @@ def _mistake(until: float, time: float, first_step: float, growth: float, longes
         return f"first_step is {first_step!r} s, expected a positive number"
     if not longest > 0:
         return f"longest is {longest!r} s, expected a positive number"
-    return None if np.isfinite(growth) and growth >= 1 else f"growth is {growth!r}, expected 1 or more"
+    return None if is_finite(growth) and growth >= 1 else f"growth is {growth!r}, expected 1 or more"

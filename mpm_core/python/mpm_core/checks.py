@@ -12,7 +12,7 @@ def positive(name: str, value: float, unit: str, *, zero: bool = False) -> float
     """A finite number above zero, or at least zero."""
     expected = "number not below zero" if zero else "positive number"
     try:
-        number = float(value)
+        number = float(0.0 + value)  # float() alone would read a text
     except (TypeError, ValueError):
         raise InputError(f"{name} is {value!r}, expected a {expected}") from None
     if not (np.isfinite(number) and (number >= 0 if zero else number > 0)):
