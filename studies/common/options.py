@@ -18,7 +18,6 @@ import math
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -26,7 +25,7 @@ from mpi4py import MPI
 
 from .files import PROGRAM
 from .notes import checkpoint_notes
-from .parameters import Parameter, ParameterError, checked_values, described, read_parameters
+from .parameters import Parameter, ParameterError, checked_values, described, did_you_mean, read_parameters
 
 
 class Options(argparse.Namespace):
@@ -111,7 +110,9 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         message = re.sub(r"^argument ([^:]+): (is|has) ", r"\1 \2 ", message)
         wrong = re.search(r"unrecognized arguments: (--[\w-]+)", message)
-        message += did_you_mean(wrong.group(1), self._option_string_actions) if wrong else ""
+        if wrong:
+            before = f"; it comes before the study: {PROGRAM} --ranks N {self.prog.split()[-1]}"
+            message += before if wrong[1] == "--ranks" else did_you_mean(wrong[1], self._option_string_actions)
         self.exit(2, f"{self.prog}: {message}\n(--help lists the options)\n")
 
 
@@ -241,12 +242,6 @@ def add_code(parser: argparse.ArgumentParser, name: str, metavar: str, text: str
             "--allow-code",
             "run the code that a file of parameters or a checkpoint names; see docs/howto/trust.md",
         )
-
-
-def did_you_mean(word: str, names: Iterable[str]) -> str:
-    """What a message adds for a word that is nearly one of some names; empty where it is not."""
-    near = get_close_matches(word, list(names), cutoff=0.8)
-    return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 def check(parser: argparse.ArgumentParser, holds: bool, message: Callable[[], str] | str) -> None:

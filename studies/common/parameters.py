@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -69,12 +70,19 @@ def checked_values(source: str, table: Mapping[str, Any], actions: Sequence[argp
     values: dict[str, object] = {}
     for key, value in table.items():
         if key not in known:
-            raise ParameterError(f"{source}: unknown key '{key}', expected some of {', '.join(known)}")
+            expected = did_you_mean(key, known) or f", expected some of {', '.join(known)}"
+            raise ParameterError(f"{source}: unknown key '{key}'{expected}")
         try:
             values[known[key].dest] = None if value is None else _from_toml(known[key], value)
         except (argparse.ArgumentTypeError, ValueError) as error:
             raise ParameterError(f"{source}: {key} {error}") from None
     return values
+
+
+def did_you_mean(word: str, names: Iterable[str]) -> str:
+    """What a message adds for a word that is nearly one of some names; empty where it is not."""
+    near = get_close_matches(word, list(names), cutoff=0.8)
+    return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 def plain_values(parameters: Sequence[Parameter]) -> dict[str, Any]:

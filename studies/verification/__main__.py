@@ -14,7 +14,8 @@ from time import process_time
 from _case import Result, line
 from _table import CaseRow, Table, case_row, save_docs, save_page, save_table
 from common.files import PROGRAM
-from common.options import add_flag, check, did_you_mean, study_parser
+from common.options import add_flag, check, study_parser
+from common.parameters import did_you_mean
 from common.ranks import run_study
 from common.results import ROOT, note_what_was_written, open_results, subfolder
 from mpi4py import MPI

@@ -58,6 +58,7 @@ REFUSED = [
     # words that are nearly right
     ("slope", "--material mohrcoulomb", "; did you mean mohr-coulomb?"),
     ("handover", "--fractions 2", "unrecognized arguments: --fractions 2\n"),
+    ("wall", "--ranks 2", "unrecognized arguments: --ranks 2; it comes before the study: studies/run --ranks N "),
     # the mesh of a slope, its particles, and files
     ("slope", "--angle 60 --mesh crossed", "--mesh is crossed, expected fitted or gmsh for --angle 60"),
     ("slope", "--cell-size 0.3", "--mesh is crossed, expected fitted or gmsh for --angle 45, --height 1, --crest 1.1 and"),

@@ -54,8 +54,8 @@ def test_what_was_written_is_read_back_to_the_last_bit(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("heigth = 1", "given.toml: unknown key 'heigth', expected some of cell-size, dt,"),
-        ("output = 'x'", "unknown key 'output'"),
+        ("cel-size = 1", "given.toml: unknown key 'cel-size'; did you mean cell-size?"),
+        ("output = 'x'", "unknown key 'output', expected some of cell-size, dt,"),
         ("cell-size = 'big'", "given.toml: cell-size is 'big', expected a number"),
         ("cell-size = -1", "given.toml: cell-size is '-1', expected a number above 0 m"),
         ("cell-size = [1]", "given.toml: cell-size is [1], expected a number"),
