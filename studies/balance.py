@@ -2,8 +2,8 @@
 
 DOLFINx partitions the background mesh by cells. Soil fills only some of them, so that ranks have different numbers of particles
 from the start, which change as the slope slides. Each step waits for the rank with most particles. The slope slides twice: with
-the first partition, and with a repartition by the number of particles (PT-SCOTCH) whenever the load imbalance exceeds the
-threshold.
+the first partition, and with a repartition by the number of particles (PT-SCOTCH) whenever the load imbalance exceeds
+--rebalance.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ def parser() -> ArgumentParser:
     add_number(p, "--time", 1.5, "s", "duration of the slide", above=0)
     add_number(
         p,
-        "--threshold",
+        "--rebalance",
         1.2,
         "-",
-        "load imbalance at which the mesh is repartitioned: maximum over mean particles per rank",
+        "repartition the mesh above this load imbalance: maximum over mean particles per rank",
         above=1,
     )
     add_count(p, "--frames", 60, "times at which particles are counted")
@@ -58,7 +58,7 @@ class Slide:
     seconds: float = 0.0
 
 
-def slide(case: SlopeCase, until: float, frames: int, threshold: float | None) -> Slide:
+def slide(case: SlopeCase, until: float, frames: int, rebalance: float | None) -> Slide:
     """Run the slope without damping from zero stress. Collective."""
     run, model = Slide(), case.model
 
@@ -70,10 +70,10 @@ def slide(case: SlopeCase, until: float, frames: int, threshold: float | None) -
             "position": p.position, "volume": p.volume, "id": p.id, "rank": np.full(len(p), float(comm.rank))
         }))  # fmt: skip
 
-    with Progress("first partition" if threshold is None else "repartition", until, comm) as progress:
+    with Progress("first partition" if rebalance is None else "repartition", until, comm) as progress:
         look(0.0)
         started = perf_counter()
-        for report in model.explicit(until, every=until / frames, pic=0.02, rebalance=threshold):
+        for report in model.explicit(until, every=until / frames, pic=0.02, rebalance=rebalance):
             run.seconds += perf_counter() - started
             look(report.time)
             progress.show(report.time, report.steps)
@@ -99,7 +99,7 @@ def main(arguments: list[str] | None = None) -> int:
     folder = open_results(a, comm)
     cases = [build_slope(a, comm) for _ in range(2)]
     runs = {"first partition": slide(cases[0], a.time, a.frames, None),
-            "repartition": slide(cases[1], a.time, a.frames, a.threshold)}  # fmt: skip
+            "repartition": slide(cases[1], a.time, a.frames, a.rebalance)}  # fmt: skip
     scene = cases[0].scene()
     first, repartitioned = runs.values()
     results = {

@@ -64,12 +64,17 @@ def parser() -> ArgumentParser:
     p.set_defaults(young=1e9)
     add_number(p, "--damping", 0.1, "-", "local damping", at_least=0, below=1)
     add_number(p, "--time", 1.5, "s", "duration of the slide", above=0)
-    add_count(p, "--frames", 40, "times of the history")
+    add_count(p, "--frames", 40, "times at which the history is stored")
     add_number(
         p, "--plastic-strain", 0.05, "-", "plastic strain above which a resting cell turns into particles", above=0
     )
     add_number(
-        p, "--displacement", 0.015, "-", "ratio of the displacement to the cell size above which it turns, too", above=0
+        p,
+        "--displacement",
+        0.015,
+        "-",
+        "ratio of the displacement to the cell size above which it turns into particles, too",
+        above=0,
     )
     return p
 

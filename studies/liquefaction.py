@@ -51,9 +51,9 @@ def parser() -> ArgumentParser:
     """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_number(p, "--height", 3.0, "m", "height of the slope", above=0)
-    add_number(p, "--angle", 12.0, "degrees", "angle of the slope", above=0, below=60)
+    add_number(p, "--angle", 12.0, "degrees", "inclination of the slope", above=0, below=60)
     add_number(p, "--crest", 4.0, "m", "length of the level ground behind the slope", above=0)
-    add_number(p, "--runout", 8.0, "m", "length of the mesh beyond the toe", above=0)
+    add_number(p, "--runout-length", 8.0, "m", "length of the background mesh beyond the toe", above=0)
     add_number(p, "--cell-size", 0.25, "m", "edge of the triangles", above=0)
     add_number(p, "--pressure-ratio", 0.9, "-", "ratio of the rise of the pore pressures to the effective vertical stresses",
                at_least=0, below=1)  # fmt: skip
@@ -76,7 +76,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     a = p.parse_args(arguments)
     check(p, a.angle < a.friction_angle, lambda: f"--angle is {a.angle:g}, expected less than --friction-angle, "
           f"{a.friction_angle:g} degrees")  # fmt: skip
-    length = a.crest + a.height / np.tan(np.radians(a.angle)) + a.runout
+    length = a.crest + a.height / np.tan(np.radians(a.angle)) + a.runout_length
     check_cells(
         p,
         a,
@@ -85,7 +85,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
         "--height",
         "--angle",
         "--crest",
-        "--runout",
+        "--runout-length",
     )
     check_restart(p, a, body_runs.MAY_CHANGE)
     return a
@@ -107,7 +107,7 @@ def depth(a: Namespace, x: np.ndarray) -> np.ndarray:
 
 def build(a: Namespace) -> mpm.Model:
     """The slope at rest, and then with the raised pore pressures. Collective."""
-    mesh = bridge.slope_mesh(comm, a.height, a.angle, a.crest, a.cell_size, kind="gmsh", runout=a.runout)
+    mesh = bridge.slope_mesh(comm, a.height, a.angle, a.crest, a.cell_size, kind="gmsh", runout=a.runout_length)
     sand = mpm.MohrCoulomb(young=a.young, poisson=0.3, cohesion=a.cohesion, friction_angle=a.friction_angle,
                            dilation_angle=0.0)  # fmt: skip
     model = mpm.Model(bridge.background_mesh(*mesh), sand)

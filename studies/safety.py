@@ -48,7 +48,7 @@ def parser() -> ArgumentParser:
     add_fem_slope_options(p)
     add_ground_option(p)
     add_number(p, "--unit-weight", 20e3, "N/m3", "unit weight of the soil", above=0)
-    add_number(p, "--start", 0.5, "-", "first factor to try; the slope must be stable with it", above=0)
+    add_number(p, "--start", 0.5, "-", "first factor of safety to try; the slope must be stable with it", above=0)
     add_flow_options(p)
     add_site_option(p)
     p.add_argument(

@@ -159,3 +159,11 @@ def test_warnings_are_shown_without_their_place(tmp_path):
         env={**os.environ, "PYTHONPATH": f"{os.environ.get('PYTHONPATH', '')}:{STUDIES}"},
     )
     assert done.stderr == "warning: soft\n"
+
+
+@pytest.mark.parametrize("study, option", [("balance", "rebalance"), ("liquefaction", "runout-length")])
+def test_an_option_has_the_name_that_it_has_in_the_study_slope(study, option):
+    options = {p.name: p for p in importlib.import_module(study).parser().parse_args([]).parameters()}
+    slope = {p.name: p for p in importlib.import_module("slope").parse([]).parameters()}
+    assert options[option].unit == slope[option].unit
+    assert slope[option].meaning.startswith(options[option].meaning)
