@@ -92,6 +92,11 @@ def test_a_new_study_runs_as_it_is(begun):
     ).exists()
 
 
+def test_the_slide_of_a_new_study_is_without_warnings_on_coarse_cells(begun):
+    done = talus(begun, "run", "mine", "--cell-size", "0.5", "--time", "1", "--frames", "5")
+    assert done.returncode == 0 and "warning" not in done.stderr
+
+
 def test_studies_of_another_folder(begun, tmp_path_factory):
     elsewhere = tmp_path_factory.mktemp("elsewhere")
     (begun / "notes.py").write_text('"""No study."""')
