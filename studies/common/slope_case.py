@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 from mpm_core.probes import nearest_particle
+from mpm_core.setup_warnings import angles_in_radians
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -232,9 +233,11 @@ def solved_fem(case: SlopeCase, unit_weight: float, nmd: bool = False) -> bridge
     with without_warning(NOT_REACHED):  # said by the error
         fem.solve(bridge.Load(unit_weight=unit_weight))
     if not fem.converged:
+        radians = angles_in_radians(fem.laws)
         raise mpm.InputError(
-            f"--initial-unit-weight is {unit_weight:g} N/m3, which the slope does not carry: the finite elements found no "
-            f"equilibrium above {fem.load.unit_weight:.5g} N/m3; lower --initial-unit-weight or raise --cohesion"
+            f"--initial-unit-weight is {unit_weight:g} N/m3, which the slope does not carry: the finite elements found no equilibrium "
+            f"above {fem.load.unit_weight:.5g} N/m3; lower --initial-unit-weight, or raise --cohesion or --friction-angle"
+            + (f". Note that {radians}" if radians else "")
         )
     return fem
 

@@ -34,6 +34,11 @@ def test_initial_unit_weight_beyond_collapse_is_named_with_what_the_slope_carrie
     assert 20e3 < float(result.stderr.split("above ")[1].split()[0]) < 26e3
 
 
+def test_a_friction_angle_in_radians_is_named_where_the_slope_does_not_carry_its_weight(tmp_path):
+    result = slope(tmp_path, "--friction-angle", "0.43")
+    assert result.returncode == 2 and "0.43 rad are 24.6 degrees" in result.stderr
+
+
 def test_elastic_start_is_in_equilibrium_too(tmp_path):
     assert slope(tmp_path, "--initial", "elastic").returncode == 0
     assert json.loads((tmp_path / "summary.json").read_text())["initial_out_of_balance_ratio"] < 1e-8
