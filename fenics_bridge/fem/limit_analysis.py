@@ -157,7 +157,7 @@ def _best(slope: _Slope) -> _Mechanisms:
 
 
 def _searched(mechanisms: Any, slope: _Slope) -> _Mechanisms:
-    """The best of the mechanisms that two shares between 0 and 1 describe: a grid search, refined around its best point."""
+    """The best of the mechanisms that two fractions between 0 and 1 describe: a grid search, refined around its best point."""
     centre, half, points = np.full(2, 0.5), 0.5, 25
     for _ in range(20):
         start, end = np.clip(centre[:, None] + half * np.linspace(-1, 1, points), 1e-6, 1 - 1e-6)
@@ -167,10 +167,10 @@ def _searched(mechanisms: Any, slope: _Slope) -> _Mechanisms:
     return mechanisms(slope, *centre)
 
 
-def _through_slope(slope: _Slope, start_share: Any, end_share: Any) -> _Mechanisms:
+def _through_slope(slope: _Slope, start_fraction: Any, end_fraction: Any) -> _Mechanisms:
     """Spirals that end at the toe, or so far above it, on the slope, that they reach no deeper than the ground."""
-    start = start_share * np.pi / 2
-    end = start + end_share * (np.pi - start)
+    start = start_fraction * np.pi / 2
+    end = start + end_fraction * (np.pi - start)
     x, y = _points(slope, start, end)
     rise = y[..., 0] - y[..., -1]
     depth = math.inf if slope.depth is None else slope.depth
@@ -178,14 +178,14 @@ def _through_slope(slope: _Slope, start_share: Any, end_share: Any) -> _Mechanis
     return _mechanisms(slope, end - start, (x, y), x[..., -1], height)
 
 
-def _before_toe(slope: _Slope, start_share: Any, end_share: Any) -> _Mechanisms:
+def _before_toe(slope: _Slope, start_fraction: Any, end_fraction: Any) -> _Mechanisms:
     """Spirals that rise to the ground before the toe, and reach no deeper than the ground.
 
     The pole is above the middle of the slope, as far as the toe is above the spiral: a slope further to the left has lost soil
     that drives, one further to the right has soil that resists.
     """
     assert slope.depth is not None
-    start = start_share * np.pi / 2
+    start = start_fraction * np.pi / 2
     lowest = np.pi / 2 + np.arctan(slope.tangent)
     (top, bottom), level = (_level(slope, start, angle) for angle in (start, lowest)), slope.depth / (1 + slope.depth)
     below, above = np.broadcast_arrays(lowest + 0 * start, np.pi)
@@ -193,7 +193,7 @@ def _before_toe(slope: _Slope, start_share: Any, end_share: Any) -> _Mechanisms:
         middle = 0.5 * (below + above)
         is_above = _level(slope, start, middle) > bottom + level * (top - bottom)
         below, above = np.where(is_above, below, middle), np.where(is_above, middle, above)
-    end = lowest + end_share * (above - lowest)
+    end = lowest + end_fraction * (above - lowest)
     x, y = _points(slope, start, end)
     height = y[..., 0] - y[..., -1]
     back = height / math.tan(slope.angle)

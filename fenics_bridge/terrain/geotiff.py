@@ -44,7 +44,7 @@ def read_geotiff(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], 
     ny, nx = values.shape
     straight = grid.b == grid.d == 0 and grid.a > 0 and abs(grid.a + grid.e) <= 1e-6 * grid.a
     if not straight or nx < 2 or ny < 2:
-        raise InputError(f"path: {str(path)!r} has {nx} by {ny} cells of {grid.a:g} by {-grid.e:g}, turned by {grid.b:g}, "
+        raise InputError(f"path: {str(path)!r} has {nx} by {ny} cells of {grid.a:g} by {-grid.e:g}, rotated by {grid.b:g}, "
                          "expected squares, with north up; see gdalwarp -tr")  # fmt: skip
     x = grid.c + grid.a * (np.arange(nx) + 0.5)
     y = grid.f + grid.e * (np.arange(ny)[::-1] + 0.5)

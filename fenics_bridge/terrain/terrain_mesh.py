@@ -70,7 +70,7 @@ def _check(ground: Any, cell_size: float, height: float, coarse: Any, below: Any
     if not (x0 < x1 and y0 < y1):
         raise InputError(f"fine is {fine!r} m, expected two corners, the lower left one first")
     if min(len(ground.x), len(ground.y)) < 4:
-        raise InputError(f"ground has {len(ground.y)} rows and {len(ground.x)} columns, expected 4 or more of both")
+        raise InputError(f"ground has {len(ground.y)} rows and {len(ground.x)} columns, expected at least 4 of each")
 
 
 def _plan(ground: Any, cell_size: float, coarse: Any, fine: Any) -> tuple[Any, ...]:

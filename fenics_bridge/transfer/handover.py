@@ -228,7 +228,7 @@ def _warn_of_other_weight(model: mpm.Model, fem: Any) -> None:
     if (too_low or too_high) and model.comm.rank == 0:
         warnings.warn(
             f"the unit weight of particles is {low if too_low else high:.5g} N/m3, density times gravity, that of the finite "
-            f"elements {min(carried):.5g} to {max(carried):.5g} N/m3: their equilibrium is another one",
+            f"elements {min(carried):.5g} to {max(carried):.5g} N/m3: the stresses do not balance the weight of the particles",
             RuntimeWarning,
             stacklevel=3,
         )
@@ -268,8 +268,8 @@ def _warn_of_missing_loads(model: mpm.Model, fem: Any) -> None:
             missing.append(f"prescribed displacement at {support.facet_tag!r}")
     if missing and comm.rank == 0:
         warnings.warn(
-            f"the finite elements carry {', '.join(missing)}, which particles do not have, so that their equilibrium is another one: "
-            'give it to them before, by Model.traction, load_surface, particles.set("traction", ...) or fix',
+            f"the finite elements carry {', '.join(missing)}, which the particles do not, so that the stresses do not "
+            'balance their loads: give it to them first, by Model.traction, load_surface, particles.set("traction", ...) or fix',
             RuntimeWarning,
             stacklevel=3,
         )

@@ -261,9 +261,9 @@ class CoupledConstraints:
         self.dofs = np.concatenate([self._supports.dofs, dofs, self._lonely])
         self.bcs = [*self._bcs, fem.dirichletbc(np.float64(0.0), dofs, self._space.sub(1))]
 
-    def at(self, share: float) -> NDArray[np.float64]:
+    def at(self, fraction: float) -> NDArray[np.float64]:
         """Values of the dofs at a fraction of the displacements that the supports prescribe."""
-        return np.concatenate([self._supports.at(share), self._pressures, self._resting])
+        return np.concatenate([self._supports.at(fraction), self._pressures, self._resting])
 
 
 class ReservoirLoads:

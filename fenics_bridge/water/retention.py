@@ -176,7 +176,7 @@ class Tabulated(_Curve):
         lengths = {len(self.suction), len(self.saturation_values), len(self.permeability_values)}
         if len(lengths) != 1 or lengths == {1} or lengths == {0}:
             raise InputError(f"suction, saturation_values and permeability_values have {sorted(lengths)} values, "
-                             "expected as many of each, two or more")  # fmt: skip
+                             "expected the same number of each, at least two")  # fmt: skip
         s = np.asarray(self.suction, dtype=float)
         if not (s[0] == 0 and np.all(np.diff(s) > 0) and np.all(np.isfinite(s))):
             raise InputError(f"suction is {self.suction!r} Pa, expected rising values from 0 on")

@@ -99,7 +99,9 @@ class ConsolidationSite:
         off = self.stages[0].off
         wet = {soil: porous for soil, porous in self.soils.items() if porous is not None and soil not in off}
         if not wet:
-            raise mpm.InputError("soils: none that is there at the beginning has a conductivity, expected one or more")
+            raise mpm.InputError(
+                "soils: no soil that is there at the beginning has a conductivity, expected at least one"
+            )
         body = self.mesh if len(wet) == len(self.soils) else bridge.soil_mesh(*self.mesh, tag=list(wet))
         flow = water.Seepage(body[0], wet, body[2], self.boundary, cell_tags=body[1])
         flow.solve()

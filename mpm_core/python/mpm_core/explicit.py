@@ -54,7 +54,7 @@ def warn_of_parts(model: Model) -> None:
     count = count_parts(model)
     if count > 1 and model.comm.rank == 0:
         warnings.warn(
-            f"the body consists of {count} parts, which do not feel each other while cells move with them (moving_cells=True)",
+            f"the body consists of {count} parts, between which no force acts while cells move with them (moving_cells=True)",
             RuntimeWarning,
             stacklevel=3,
         )

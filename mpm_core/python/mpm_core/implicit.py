@@ -146,7 +146,7 @@ class Stepper:
             self.control.cut(dt)
             if self.control.is_too_short:
                 raise RunError(
-                    f"the implicit step at t = {self._core.time:.9g} s failed with all lengths from "
+                    f"the implicit step at t = {self._core.time:.9g} s failed with all step lengths from "
                     f"{self.control.longest:.3g} s down to {dt:.3g} s: {reason}"
                 )
         if self.last.easy:

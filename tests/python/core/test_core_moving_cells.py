@@ -280,7 +280,7 @@ def test_parts_that_do_not_feel_each_other_are_warned_of():
     model.seed_points(points, [0.1, 0.1], density=2000.0)
     model.set_gravity((0, -1.0))
     model.fix(3)
-    with pytest.warns(RuntimeWarning, match="2 parts, which do not feel each other while cells move"):
+    with pytest.warns(RuntimeWarning, match="2 parts, between which no force acts while cells move"):
         run(model, 1e-3, moving_cells=True)
 
 

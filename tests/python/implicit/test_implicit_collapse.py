@@ -41,7 +41,7 @@ def test_displacements_and_collapse_load_are_those_of_the_finite_elements(nmd):
     assert np.abs(u[order] - expected).max() < 1e-6 * np.abs(expected).max()
 
     collapse = bridge.collapse_load(fem, lambda g: bridge.Load(unit_weight=g), 1e3, start=weight)
-    with pytest.raises(mpm.RunError, match="failed with all lengths"):
+    with pytest.raises(mpm.RunError, match="failed with all step lengths"):
         raised(model, TOP, 1e3, nmd, solver=mpm.Newton(max_iterations=12))
     assert TOP * model.time == pytest.approx(collapse.value, rel=5e-3)
     assert not model.particles.displacement.any() and np.ptp(model.particles.volume) < 1e-12

@@ -145,7 +145,7 @@ def test_a_step_that_fails_is_cut_and_leaves_the_particles_as_they_were():
     before = {
         name: getattr(model.particles, name) for name in ("id", "position", "velocity", "stress", "volume", "state")
     }
-    with pytest.raises(RunError, match="failed with all lengths from 1 s down to 0.000977 s"):
+    with pytest.raises(RunError, match="failed with all step lengths from 1 s down to 0.000977 s"):
         list(model.implicit(1.0, dt=1.0, quasi_static=True, solver=mpm.Newton(max_iterations=8)))
     assert model.time == 0
     order = np.argsort(model.particles.id)

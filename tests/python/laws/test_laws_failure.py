@@ -91,7 +91,7 @@ def test_implicit_run_ends_with_law_particle_place_and_increment():
     with pytest.raises(mpm.RunError) as error:
         list(model.implicit(1e-4, dt=1e-4, quasi_static=True))
     pattern = (
-        r"the implicit step at t = 0 s failed with all lengths from 0.0001 s down to .* s: particle \d+ at \(.*\) m .* follows "
+        r"the implicit step at t = 0 s failed with all step lengths from 0.0001 s down to .* s: particle \d+ at \(.*\) m .* follows "
         r"the law PythonLaw of Fragile \(number 0\), which failed for the strain increment \(.*\) \(in the step after t = 0 s\)"
     )
     assert re.fullmatch(pattern, str(error.value)), error.value

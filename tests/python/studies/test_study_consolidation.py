@@ -201,7 +201,7 @@ def test_layers_that_are_placed_in_stages_settle_the_clay_below_as_their_weights
             "day = 1.0\nfill = 'first'\nexcavate = 'second'\n[[stages]]\nday = 2.0\nfill = 'second'",
             "'second' is not there",
         ),
-        ("day = 1.0\nfill = 'clay'", "soils: none that is there at the beginning has a conductivity"),
+        ("day = 1.0\nfill = 'clay'", "soils: no soil that is there at the beginning has a conductivity"),
     ],
 )
 def test_wrong_stages_are_named(stages, words, tmp_path):
