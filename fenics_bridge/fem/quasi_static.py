@@ -329,7 +329,10 @@ class QuasiStatic(SupportedBody, PointFunctions):
         return self.displacement.function_space, out_of_balance, self.facet_tags, self.supports
 
     def reaction(self, facet_tag: int | str) -> NDArray[np.float64]:
-        """As of `SupportedBody`: of the soil, and of its pore water on the facets in the components that are held. Collective."""
+        """Force of the soil and its pore water on the support at the facets of a tag, (D,) [N], [N/m] in plane strain. Collective.
+
+        See `SupportedBody.reaction`; the water acts in the components that are held.
+        """
         return super().reaction(facet_tag) + water_on_supports(self, facet_tag)
 
     def largest_pore_pressure(self) -> float:

@@ -248,9 +248,12 @@ class FarField:
         return self._facets.points.reshape(-1, self._domain.geometry.dim)[first]
 
     def displacement(self, model: mpm.Model) -> fem.Function:
-        """Displacement of the ground [m], for that of the border since `attach` and under the present gravity.
+        """Displacement of the far field since `attach` [m], which follows from that of the border and from the present gravity.
 
-        Where it was attached `balanced`, without the part of gravity that was there before.
+        A far field that was attached as `balanced` was in equilibrium with the gravity of that time: only its change counts.
+
+        Args:
+            model: the model that the far field is attached to.
         """
         moved = model.far_field_displacement
         border = np.stack([self._projection[a] @ moved[:, a] for a in range(moved.shape[1])], axis=1)

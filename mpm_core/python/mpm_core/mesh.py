@@ -163,14 +163,28 @@ class Mesh:
         return self._core.volumes()
 
     def cells_of(self, points: ArrayLike) -> NDArray[np.int32]:
-        """Number of the cell on this rank that contains each point, -1 outside of its cells; shape (n,)."""
+        """Number of the cell on this rank that contains each point, -1 outside of its cells; shape (n,). Not collective.
+
+        Args:
+            points: positions [m], shape (n, D).
+
+        Raises:
+            InputError: points of another shape or dtype.
+        """
         return self._core.cells_of(floats("points", points, (None, self.dim)))
 
     def nodal_of(self, other: "Mesh", values: ArrayLike) -> NDArray[np.float64]:
         """Nodal values of the same mesh under another partition, at the nodes of this one. Collective.
 
+        Args:
+            other: the mesh under the other partition.
+            values: a row for each of its nodes, shape (nodes,) or (nodes, k).
+
         Returns:
-            Shape (nodes,) or (nodes, k).
+            A row for each node of this mesh, shape (nodes,) or (nodes, k).
+
+        Raises:
+            InputError: values of another shape, or another mesh.
 
         Example:
             >>> start = model.mesh

@@ -149,7 +149,10 @@ class Model(ContactMethods, Body):
         return Report(time=self.time, steps=self._core.steps, dt=self._core.last_dt, **values)
 
     def nodal(self, name: str, velocity_field: int = 0) -> Any:
-        """A copy of a nodal field of the last step: velocity, acceleration, internal_force (nodes, D) or mass (nodes,)."""
+        """A copy of a nodal field of the last step, a row for each of ``mesh.points``; InputError before the first one.
+
+        It is "velocity" [m/s], "acceleration" [m/s2], "internal_force" [N], shape (nodes, D), or "mass" [kg], (nodes,).
+        """
         return self._core.nodal(name, velocity_field)
 
     def explicit(
