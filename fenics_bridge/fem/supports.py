@@ -17,7 +17,7 @@ from fenics_bridge.errors import InputError, agree, is_finite
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.mesh.tagged import require_tags_of
 from fenics_bridge.types import MeshTags
-from mpm_core.mesh import Tag
+from mpm_core.mesh import Tag, floats
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def roller(facet_tag: int | str, normal: ArrayLike) -> Support:
     Raises:
         InputError: normal is not an axis.
     """
-    normal = np.asarray(normal, dtype=float)
+    normal = floats("normal", normal, (None,))
     along = np.flatnonzero(normal)
     if len(along) != 1:
         raise InputError(

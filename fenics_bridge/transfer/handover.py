@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from mpm_core.checks import renamed
+from mpm_core.checks import of_kind, renamed
 from numpy.typing import NDArray
 
 import mpm_core as mpm
@@ -108,7 +108,7 @@ def initialise(
         InputError: a particle is outside the finite elements' mesh or, moved, outside the background mesh, laws or geometries do
             not match, or the finite elements did not converge. Raised on all ranks alike.
     """
-    particles = model.particles
+    particles = of_kind("model", model, mpm.Model).particles
     _require_usable(model, fem, move)
     _warn_of_other_weight(model, fem)
     _warn_of_other_water(model, fem)

@@ -83,7 +83,7 @@ class PorousSoil:
 
     def __post_init__(self) -> None:
         try:
-            k = np.asarray(self.conductivity, dtype=float)
+            k = np.multiply(1.0, self.conductivity)  # which refuses text
         except (TypeError, ValueError):
             k = np.full(1, np.nan)
         square = k.ndim == 2 and k.shape[0] == k.shape[1] and np.allclose(k, k.T)

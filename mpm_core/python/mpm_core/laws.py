@@ -4,14 +4,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import CamClay, ConeMatch, DruckerPrager, InputError, MohrCoulomb, cone_slope, cone_strength
-from .checks import member
+from .checks import member, positive
 from .mesh import floats
-
-
-def _positive(name: str, value: float) -> float:
-    if not value > 0:
-        raise InputError(f"{name} = {value}, but it must be positive [Pa]")
-    return value
 
 
 def tresca(*, young: float, poisson: float, shear_strength: float) -> MohrCoulomb:
@@ -24,7 +18,7 @@ def tresca(*, young: float, poisson: float, shear_strength: float) -> MohrCoulom
         poisson: Poisson's ratio [-].
         shear_strength: strength in shear, s_u [Pa].
     """
-    strength = _positive("shear_strength", shear_strength)
+    strength = positive("shear_strength", shear_strength, "Pa")
     return MohrCoulomb(young=young, poisson=poisson, cohesion=strength, friction_angle=0.0)
 
 
@@ -36,7 +30,7 @@ def von_mises(*, young: float, poisson: float, yield_stress: float) -> DruckerPr
         poisson: Poisson's ratio [-].
         yield_stress: strength in uniaxial tension or compression [Pa]; in pure shear it is 1/sqrt(3) of that.
     """
-    return DruckerPrager(young=young, poisson=poisson, strength=_positive("yield_stress", yield_stress) / 3**0.5)
+    return DruckerPrager(young=young, poisson=poisson, strength=positive("yield_stress", yield_stress, "Pa") / 3**0.5)
 
 
 def matched_drucker_prager(

@@ -28,6 +28,10 @@ def model():
         (lambda: water.VanGenuchten(alpha="1e-4", n=2.0), "alpha is '1e-4' 1/Pa"),
         (lambda: water.VanGenuchten(alpha=1e-4, n="2"), "n is '2'"),
         (lambda: water.Newmark(gamma="0.5"), "gamma is '0.5'"),
+        (lambda: water.PorousSoil("1e-5"), "conductivity is '1e-5' m/s"),
+        (lambda: mpm.tresca(young=1e6, poisson=0.3, shear_strength="20e3"), "shear_strength is '20e3'"),
+        (lambda: bridge.roller("left", ("1", "0")), "normal has dtype <U1"),
+        (lambda: bridge.initialise("fem", model()), "model is 'fem'"),
         (lambda: bridge.hydrostatic(0.0, unit_weight="9810"), "unit_weight is '9810' N/m3"),
     ],
 )
