@@ -226,9 +226,10 @@ def _warn_of_other_weight(model: mpm.Model, fem: Any) -> None:
     high = model.comm.allreduce(float(own.max(initial=0.0)), MPI.MAX)
     too_low, too_high = low < (1 - SAME_WEIGHT) * min(carried), high > (1 + SAME_WEIGHT) * max(carried)
     if (too_low or too_high) and model.comm.rank == 0:
+        bounds = sorted({min(carried), max(carried)})
         warnings.warn(
             f"the unit weight of particles is {low if too_low else high:.5g} N/m3, density times gravity, that of the finite "
-            f"elements {min(carried):.5g} to {max(carried):.5g} N/m3: the stresses do not balance the weight of the particles",
+            f"elements {' to '.join(f'{x:.5g}' for x in bounds)} N/m3: the stresses do not balance the weight of the particles",
             RuntimeWarning,
             stacklevel=3,
         )

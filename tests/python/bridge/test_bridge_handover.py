@@ -249,7 +249,7 @@ def test_particles_of_another_weight_are_said(weight, said):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         bridge.initialise(slope_particles(weight), solved(degree=1), equilibrate=False)
-    words = f"unit weight of particles is {weight:.5g} N/m3"
+    words = f"unit weight of particles is {weight:.5g} N/m3, density times gravity, that of the finite elements {UNIT_WEIGHT:.5g} N/m3"
     assert any(words in str(one.message) for one in caught) == said
 
 
