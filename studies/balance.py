@@ -14,7 +14,7 @@ from time import perf_counter
 
 import numpy as np
 from common.movie import frame_of, particle_movie
-from common.options import add_count, add_number, study_parser
+from common.options import add_count, add_number, formerly, study_parser
 from common.page import Page
 from common.plots import Quantity, save_history
 from common.progress import Progress
@@ -43,6 +43,7 @@ def parser() -> ArgumentParser:
         "repartition the mesh above this load imbalance: maximum over mean particles per rank",
         above=1,
     )
+    formerly(p, "threshold", "--rebalance")
     add_count(p, "--frames", 60, "times at which particles are counted")
     return p
 

@@ -25,7 +25,7 @@ from common.checks import check_cells
 from common.figures import Pictures, curve_figure
 from common.history import History
 from common.movie import QUANTITIES, WET_QUANTITIES, particle_movie
-from common.options import add_number, check, study_parser
+from common.options import add_number, check, formerly, study_parser
 from common.plots import CURVES, Scene, colour_limits, save_particles
 from common.ranks import run_study
 from common.results import open_results
@@ -54,6 +54,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--angle", 12.0, "degrees", "inclination of the slope", above=0, below=60)
     add_number(p, "--crest", 4.0, "m", "length of the level ground behind the slope", above=0)
     add_number(p, "--runout-length", 8.0, "m", "length of the background mesh beyond the toe", above=0)
+    formerly(p, "runout", "--runout-length")
     add_number(p, "--cell-size", 0.25, "m", "edge of the triangles", above=0)
     add_number(p, "--pressure-ratio", 0.9, "-", "ratio of the rise of the pore pressures to the effective vertical stresses",
                at_least=0, below=1)  # fmt: skip

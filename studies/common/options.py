@@ -25,7 +25,15 @@ from mpi4py import MPI
 
 from .files import PROGRAM
 from .notes import checkpoint_notes
-from .parameters import Parameter, ParameterError, checked_values, described, did_you_mean, read_parameters
+from .parameters import (
+    Parameter,
+    ParameterError,
+    checked_values,
+    described,
+    did_you_mean,
+    present_name,
+    read_parameters,
+)
 
 
 class Options(argparse.Namespace):
@@ -65,10 +73,11 @@ class _Parser(argparse.ArgumentParser):
     """A parser that also reads a file of parameters and, on several ranks, prints on the first one only."""
 
     def parse_args(self, args: Sequence[str] | None = None, namespace: None = None) -> Options:  # type: ignore[override]
+        args = [self._present_word(word) for word in (sys.argv[1:] if args is None else args)]
         options = Options()
         options.actions, options.study = self._actions, self.prog.split()[-1]
         options.description = self.description or options.study
-        options.given = {word.split("=")[0] for word in (sys.argv[1:] if args is None else args) if word[:2] == "--"}
+        options.given = {word.split("=")[0] for word in args if word[:2] == "--"}
         options.notes, options.restarts = {}, []
         try:
             self._take_defaults_from_files(args, options)
@@ -76,7 +85,11 @@ class _Parser(argparse.ArgumentParser):
             self.error(str(error))
         return super().parse_args(args, options)
 
-    def _take_defaults_from_files(self, args: Sequence[str] | None, options: Options) -> None:
+    def _present_word(self, word: str) -> str:
+        name, equals, value = word.partition("=")
+        return present_name(name, self._actions) + equals + value if name[:2] == "--" else word
+
+    def _take_defaults_from_files(self, args: Sequence[str], options: Options) -> None:
         """Values of a checkpoint, overridden by those of a file of parameters, become the defaults of the command line."""
         first = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
         names = ["parameters", *(["restart"] if any(action.dest == "restart" for action in self._actions) else [])]
@@ -242,6 +255,11 @@ def add_code(parser: argparse.ArgumentParser, name: str, metavar: str, text: str
             "--allow-code",
             "run the code that a file of parameters or a checkpoint names; see docs/howto/trust.md",
         )
+
+
+def formerly(parser: argparse.ArgumentParser, old: str, name: str) -> None:
+    """Accept an option by its name in an earlier version too, without dashes in front, with a warning."""
+    next(action for action in parser._actions if name in action.option_strings).former = old  # type: ignore[attr-defined]
 
 
 def check(parser: argparse.ArgumentParser, holds: bool, message: Callable[[], str] | str) -> None:

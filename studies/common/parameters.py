@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -69,6 +70,7 @@ def checked_values(source: str, table: Mapping[str, Any], actions: Sequence[argp
     known = _named(actions)
     values: dict[str, object] = {}
     for key, value in table.items():
+        key = present_name(key, actions)
         if key not in known:
             expected = did_you_mean(key, known) or f", expected some of {', '.join(known)}"
             raise ParameterError(f"{source}: unknown key '{key}'{expected}")
@@ -77,6 +79,17 @@ def checked_values(source: str, table: Mapping[str, Any], actions: Sequence[argp
         except (argparse.ArgumentTypeError, ValueError) as error:
             raise ParameterError(f"{source}: {key} {error}") from None
     return values
+
+
+def present_name(name: str, actions: Sequence[argparse.Action]) -> str:
+    """The name of an option that is given by its name in an earlier version, of which it warns; any other name as it is."""
+    for action in actions:
+        if getattr(action, "former", None) == name.removeprefix("--"):
+            present = action.option_strings[0]
+            note = f"the option --{action.former} is now called {present}; the old name will be removed in the next version"
+            warnings.warn(note, FutureWarning, stacklevel=2)
+            return present if name.startswith("--") else present.removeprefix("--")
+    return name
 
 
 def did_you_mean(word: str, names: Iterable[str]) -> str:

@@ -37,7 +37,7 @@ def test_fine_sand_flows_without_losing_water_or_gaining_volume_and_farther_than
 def test_the_ground_keeps_the_fraction_of_its_effective_stress_that_pore_pressures_leave():
     # Almost level ground whose pore pressures rise by 0.7 of the effective vertical stress keeps 0.3 of it, and half of this to its
     # sides, below its strength (K = 0.5 > (1 - sin 33) / (1 + sin 33) = 0.29): it does not liquefy, and its weight is still carried.
-    a = study.parse(["--cell-size", "0.5", "--pressure-ratio", "0.7", "--angle", "2", "--runout", "2"])
+    a = study.parse(["--cell-size", "0.5", "--pressure-ratio", "0.7", "--angle", "2", "--runout-length", "2"])
     model = study.build(a)
 
     def over_vertical(model):

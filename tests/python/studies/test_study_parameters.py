@@ -7,7 +7,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
-from studies.common.options import add_choice, add_count, add_flag, add_number, add_switch, study_parser
+from studies.common.options import add_choice, add_count, add_flag, add_number, add_switch, formerly, study_parser
 from studies.common.parameters import write_parameters
 
 
@@ -83,3 +83,13 @@ def test_an_option_that_is_not_there_names_its_neighbour(capsys):
     with pytest.raises(SystemExit):
         parser().parse_args(["--cell-siez", "1"])
     assert "unrecognized arguments: --cell-siez 1; did you mean --cell-size?" in capsys.readouterr().err
+
+
+def test_an_option_goes_by_its_former_name_with_a_warning(tmp_path):
+    p = parser()
+    formerly(p, "mesh-width", "--cell-size")
+    (tmp_path / "given.toml").write_text("mesh-width = 2")
+    for arguments in (["--mesh-width", "2"], ["--mesh-width=2"], ["--parameters", str(tmp_path / "given.toml")]):
+        with pytest.warns(FutureWarning, match="the option --mesh-width is now called --cell-size"):
+            assert p.parse_args(arguments).cell_size == 2
+    assert "mesh-width" not in p.format_help()
