@@ -190,6 +190,75 @@ def test_a_frame_that_fails_in_the_background_is_an_error_on_all_ranks(comm, sha
     assert (shared_path / "particles.xdmf").read_text().count("<Time ") == 2
 
 
+def large_fields(rank):
+    """Fields of 3 MB on each rank that has particles, which the first one has not."""
+    n = 100_000 if rank else 0
+    values = np.random.default_rng(rank).random((n, 3)).astype(np.float32)
+    return {"position": values, "velocity": values + 1, "mass": values[:, 0] + 2}
+
+
+@pytest.mark.parametrize("background", [True, False])
+@pytest.mark.parametrize("compression", [0, 1])
+def test_large_fields_are_written_by_several_ranks_and_read_through_the_first_file(
+    comm, shared_path, background, compression
+):
+    with ParticleOutput(shared_path / "particles", comm, compression=compression) as output:
+        if background:
+            output._series.write_in_background()
+        for time in (0.0, 1.0):
+            output.write(time, large_fields(comm.rank))
+    files = sorted(path.name for path in (shared_path / "particles").iterdir())
+    per_frame = min(comm.size, 3)  # one for each field that is larger than 1 MB
+    assert len(files) == (2 * per_frame if comm.size > 1 else 2)
+    comm.barrier()
+    if comm.rank == 0:  # results may be moved
+        (shared_path / "moved").mkdir()
+        for name in ("particles", "particles.xdmf"):
+            (shared_path / name).rename(shared_path / "moved" / name)
+    comm.barrier()
+    whole = comm.allgather(large_fields(comm.rank))
+    expected = {name: np.concatenate([fields[name] for fields in whole]) for name in whole[0]}
+    with h5py.File(shared_path / "moved/particles/000001.h5") as file:
+        assert set(file) >= set(expected)
+        for name, values in expected.items():
+            np.testing.assert_array_equal(file[name][()], values)
+    with meshio.xdmf.TimeSeriesReader(shared_path / "moved/particles.xdmf") as reader:
+        points, _ = reader.read_points_cells()
+        assert reader.num_steps == 2
+        np.testing.assert_array_equal(points, expected["position"])
+        np.testing.assert_array_equal(reader.read_data(1)[1]["velocity"], expected["velocity"])
+
+
+@pytest.mark.parametrize("background", [True, False])
+def test_a_frame_counts_only_if_all_ranks_could_write_their_fields(comm, shared_path, background):
+    if comm.size == 1:
+        pytest.skip("needs two ranks")
+    output = ParticleOutput(shared_path / "particles", comm)
+    if background:
+        output._series.write_in_background()
+    fields, refused = large_fields(comm.rank), shared_path / "particles/000001-1.h5"
+    output.write(0.0, fields)
+    if comm.rank == 0:
+        refused.mkdir()
+    comm.barrier()
+    with pytest.raises(RunError, match="cannot write .*/particles/000001-1.h5: Is a directory"):
+        output.write(1.0, fields)
+        output.close()  # else the frame is waited for here
+    comm.barrier()
+    assert not (shared_path / "particles/000001.h5").exists()
+    assert (shared_path / "particles.xdmf").read_text().count("<Time ") == 1
+    if background:
+        return
+    if comm.rank == 0:
+        refused.rmdir()
+    comm.barrier()
+    output.write(2.0, fields)
+    output.close()
+    assert (shared_path / "particles.xdmf").read_text().count("<Time ") == 2
+    with h5py.File(shared_path / "particles/000001.h5") as file:
+        assert len(file["mass"]) == 100_000 * (comm.size - 1)
+
+
 @pytest.mark.parametrize("compression", [1, 9])
 def test_compressed_values_come_back(comm, shared_path, compression):
     # Rank r has 100 r particles, so the first has none.

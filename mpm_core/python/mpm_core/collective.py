@@ -56,20 +56,25 @@ def on_first_rank(comm: MPI.Comm, work: Callable[[], T], kind: type[Exception] =
     return result
 
 
+def written(path: str | os.PathLike[str], work: Callable[[], T]) -> T:
+    """Run ``work``, which writes a file.
+
+    Raises:
+        RunError: with the path of the error, or the given one, and the reason why the system refused.
+    """
+    try:
+        return work()
+    except OSError as error:
+        raise RunError(f"cannot write {error.filename or os.fspath(path)}: {error.strerror}") from None
+
+
 def write_on_first_rank(comm: MPI.Comm, path: str | os.PathLike[str], work: Callable[[], object]) -> None:
     """Run ``work``, which writes a file, on the first rank.
 
     Raises:
-        RunError: on all ranks, with the path of the error, or the given one, and the reason why the system refused.
+        RunError: on all ranks, as of `written`.
     """
-
-    def write() -> None:
-        try:
-            work()
-        except OSError as error:
-            raise RunError(f"cannot write {error.filename or os.fspath(path)}: {error.strerror}") from None
-
-    on_first_rank(comm, write, RunError)
+    on_first_rank(comm, lambda: written(path, work), RunError)
 
 
 def check_same_path(comm: MPI.Comm, path: str | os.PathLike[str]) -> None:

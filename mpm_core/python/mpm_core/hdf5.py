@@ -1,4 +1,4 @@
-"""HDF5 files of arrays whose rows lie on all ranks. The first rank writes them with h5py."""
+"""HDF5 files of arrays whose rows lie on all ranks. One rank writes them with h5py."""
 
 from __future__ import annotations
 
@@ -15,31 +15,39 @@ from numpy.typing import NDArray
 
 
 class RowsFile:
-    """A new HDF5 file of arrays, whose rows are gathered from all ranks to the first one, which writes the file.
+    """A new HDF5 file of arrays, whose rows are gathered from all ranks to one, which writes the file.
 
     What the system refuses to write is an error of `close` only, so that no rank waits for another; the file is removed then.
 
     Args:
         path: of the file; an older one is replaced.
-        comm: communicator whose first rank writes.
+        comm: communicator of the ranks that have rows.
+        writer: rank that writes.
         compression: level of deflate, 1 to 9; 0 stores values as they are.
         checksums: protect data by checksums (Fletcher 32), and HDF5's own tables by those of its format 1.10.
     """
 
-    def __init__(self, path: str, comm: MPI.Comm, *, compression: int = 0, checksums: bool = False) -> None:
-        self._path, self._comm, self._checksums = path, comm, checksums
+    def __init__(
+        self, path: str, comm: MPI.Comm, *, writer: int = 0, compression: int = 0, checksums: bool = False
+    ) -> None:
+        self._path, self._comm, self._writer, self._checksums = path, comm, writer, checksums
         self._options: dict[str, Any] = {"fletcher32": True} if checksums else {}
         if compression:
             self._options |= {"compression": "gzip", "compression_opts": compression}
         self._arrays: dict[str, NDArray[Any]] = {}
+        self._links: dict[str, str] = {}
         self._gathers: list[MPI.Request] = []
         self._file: Any = None
         self._refusal: OSError | None = None
 
     def add_common(self, name: str, values: NDArray[Any]) -> None:
         """Add an array that is the same on all ranks."""
-        if self._comm.rank == 0:
+        if self._comm.rank == self._writer:
             self._arrays[name] = values
+
+    def add_link(self, name: str, file: str) -> None:
+        """Add a link to the array of the same name in another file of the same folder, which HDF5 follows."""
+        self._links[name] = file
 
     def add(self, name: str, rows: NDArray[Any], counts: Sequence[int]) -> None:
         """Begin to gather an array; `wait` ends it. Collective.
@@ -54,11 +62,11 @@ class RowsFile:
             self._arrays[name] = rows
             return
         whole = None
-        if self._comm.rank == 0:
+        if self._comm.rank == self._writer:
             whole = self._arrays[name] = np.empty((sum(counts), *rows.shape[1:]), rows.dtype)
         width = math.prod(rows.shape[1:])
         self._gathers.append(
-            self._comm.Igatherv(rows, whole if whole is None else [whole, [n * width for n in counts]])
+            self._comm.Igatherv(rows, whole if whole is None else [whole, [n * width for n in counts]], self._writer)
         )
 
     def wait(self) -> None:
@@ -67,7 +75,7 @@ class RowsFile:
         self._gathers.clear()
 
     def store(self) -> None:
-        """Write the arrays that are gathered, on the first rank, by any of its threads."""
+        """Write the arrays that are gathered, on the rank that writes, by any of its threads."""
         import h5py  # not where a run writes nothing
 
         if self._file is None and self._refusal is None:
@@ -80,7 +88,12 @@ class RowsFile:
             kind, space = h5py.h5t.py_create(values.dtype), h5py.h5s.create_simple(values.shape)
             dataset = h5py.h5d.create(self._file, name.encode(), kind, space, self._creation)
             dataset.write(h5py.h5s.ALL, h5py.h5s.ALL, values)
+        if self._links and self._file is not None:
+            group = h5py.h5g.open(self._file, b"/")
+            for name, file in self._links.items():
+                group.links.create_external(name.encode(), file.encode(), f"/{name}".encode())
         self._arrays.clear()
+        self._links.clear()
 
     def _open(self) -> None:
         import h5py
@@ -100,7 +113,7 @@ class RowsFile:
         self._creation.set_obj_track_times(False)  # the same frame makes the same file, whenever it is written
 
     def close(self, durable: bool = False) -> None:
-        """Write what is gathered and close the file, on the first rank.
+        """Write what is gathered and close the file; on the rank that writes, others do nothing.
 
         Args:
             durable: wait until its data are on the disk.
@@ -108,6 +121,8 @@ class RowsFile:
         Raises:
             OSError: with path and reason: the file could not be written.
         """
+        if self._comm.rank != self._writer:
+            return
         self.store()
         if self._file is not None:
             self._file.close()

@@ -1,8 +1,9 @@
-"""Particles and background mesh over time, in HDF5 files with XDMF files beside them; the first rank writes for all.
+"""Particles and background mesh over time, in HDF5 files with XDMF files beside them.
 
 ParaView, VTK and meshio open the file ``PATH.xdmf``, also while the run goes on and after it was killed. Each frame is a file of
 its own in the folder ``PATH``, ``000012.h5`` and so on, with a dataset for each field, which h5py reads directly; the XDMF file
-names it when it is whole, and it never changes again. The folder of a mesh also has ``mesh.h5``, its points and cells.
+names it when it is whole, and it never changes again. Some fields of large frames on several ranks lie in further files such
+as ``000012-1.h5``, to which the first has links. The folder of a mesh also has ``mesh.h5``, its points and cells.
 
 Fields are arrays of shape (n,) or (n, k). Two components are padded to three, so that they are vectors to ParaView; four
 and six components are a symmetric tensor, ``xx yy zz xy`` (of particles in axial symmetry ``xx yy hoop xy``) or
@@ -216,7 +217,7 @@ class ModelOutput:
         float32: store real numbers in single precision; in double precision if false. Positions are stored in double
             precision where single precision does not resolve them, as with coordinates of a map.
         compression: level of deflate, 1 to 9; 0 stores values as they are.
-        background: a thread of the first rank writes a frame while the next steps go on. `write` returns at once, and `close` and
+        background: a thread of each rank that writes does so while the next steps go on. `write` returns at once, and `close` and
             the next `write` wait for the frame and raise its error. Until then no other thread may use HDF5, but by h5py.
 
     Raises:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -17,7 +18,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ._core import InputError, RunError
-from .collective import check_same_path, write_on_first_rank
+from .collective import check_same_path, collectively, write_on_first_rank, written
 from .hdf5 import RowsFile
 
 _TENSOR = {4: ("xx", "yy", "{out}", "xy"), 6: ("xx", "yy", "zz", "xy", "yz", "xz")}
@@ -28,6 +29,8 @@ SHORT = 1 << 19
 """Characters of an XDMF file that is rewritten for each frame, some 150 frames of all fields; see `REWRITING` for longer ones"""
 REWRITING = 0.005
 """Fraction of the time in which a long XDMF file is rewritten; for each frame it would take the square of their number"""
+PART = 1 << 20
+"""Bytes of a frame beyond which another rank writes further fields, to a file of its own"""
 
 
 class Series:
@@ -36,12 +39,15 @@ class Series:
     The XDMF file is written aside and renamed for each frame, so that it is whole and names whole files only, whenever it is
     read or the run is killed. When it is long, several frames may share a rewriting; `close` names the last ones.
 
-    After `write_in_background` a thread of the first rank writes each frame, while the steps after it go on. The frame counts
-    when it is on the disk; before the next one is begun, all ranks wait for it.
+    The first rank writes small frames for all. Of large ones each rank gathers and writes some of the fields, to the files
+    ``000012-1.h5`` and so on. The XDMF file names these, and the first file has links to them, which HDF5 follows.
+
+    After `write_in_background` threads write each frame, while the steps after it go on. The frame counts when it is on the
+    disk; before the next one is begun, all ranks wait for it, and only then a frame of several files is named.
 
     Args:
         path: without suffix, or with .h5 or .xdmf. What an earlier series left there is removed.
-        comm: communicator whose first rank writes.
+        comm: communicator of the ranks that have rows.
         grid: name of the grid.
         float32: store real numbers in single precision.
         compression: level of deflate, 0 to 9.
@@ -63,8 +69,8 @@ class Series:
         self._closed, self._frames = False, [""]
         self._length, self._next_rewriting, self._unnamed = 0, 0.0, 0
         self._thread: ThreadPoolExecutor | None = None
-        self._unfinished: tuple[Callable[[], object], str] | None = None
-        """Function that writes the last frame or waits for it, and the text of the frame in the XDMF file"""
+        self._unfinished: tuple[Callable[[], object], Frame] | None = None
+        """Function that writes this rank's file of the last frame or waits for it, and the frame"""
         self.shared: dict[str, Any] = {}
         """Data of frames on the disk that later frames refer to; cleared when a frame fails, which may have stored some"""
         check_same_path(comm, text)
@@ -80,7 +86,7 @@ class Series:
     def _begin(self) -> None:
         self.folder.mkdir(exist_ok=True)
         for old in self.folder.iterdir():
-            if re.fullmatch(r"(\d{6,}|mesh)\.h5", old.name):
+            if re.fullmatch(r"(\d{6,}|mesh)(-\d+)?\.h5", old.name):
                 old.unlink()
         self._replace_xdmf(self._collection())
 
@@ -130,35 +136,34 @@ class Series:
     @contextmanager
     def _written(self, name: str, head: str, end: str | None) -> Iterator[Frame]:
         """A file to add to, then its description: of a frame among others with an end, of the only grid without."""
-        path = self.folder / f"{name}.h5"
         if self._closed:
             raise RunError(f"cannot write {self.folder}: it is closed")
-        file = RowsFile(str(path), self.comm, compression=self._compression)
-        frame = Frame(file, f"{self.folder.name}/{name}.h5", self.real)
+        frame = Frame(self.folder, name, self.comm, self.real, self._compression)
         yield frame
-        file.wait()
-        text = f"{head}{''.join(frame.text)}"
+        frame.description = f"{head}{''.join(frame.text)}{end or ''}"
+        frame.is_only_grid = end is None
+        frame.wait()
 
         def write() -> None:
-            file.close()
-            start = monotonic()
-            if self._length > SHORT and start < self._next_rewriting:
-                self._unnamed += 1
-                return
-            try:
-                self._replace_xdmf(text if end is None else self._collection(text + end))
-            except OSError:
-                with suppress(OSError):
-                    path.unlink()
-                raise
-            self._next_rewriting, self._unnamed = start + (monotonic() - start) / REWRITING, 0
+            frame.write()
+            if frame.n_files == 1:
+                self._name(frame)
 
         work: Callable[[], object] = write
-        if self._thread is not None and self.comm.rank == 0:
+        if self._thread is not None and self.comm.rank < frame.n_files:
             work = self._thread.submit(write).result
-        self._unfinished = work, "" if end is None else text + end
+        self._unfinished = work, frame
         if self._thread is None:
             self.finish()
+
+    def _name(self, frame: Frame) -> None:
+        """Name a frame that is on the disk in the XDMF file. On the first rank."""
+        start, text = monotonic(), frame.description
+        if self._length > SHORT and start < self._next_rewriting:
+            self._unnamed += 1
+            return
+        self._replace_xdmf(text if frame.is_only_grid else self._collection(text))
+        self._next_rewriting, self._unnamed = start + (monotonic() - start) / REWRITING, 0
 
     def finish(self) -> None:
         """Wait until the last frame is on the disk.
@@ -168,15 +173,20 @@ class Series:
         """
         if self._unfinished is None:
             return
-        (work, text), self._unfinished = self._unfinished, None
+        (work, frame), self._unfinished = self._unfinished, None
         try:
-            write_on_first_rank(self.comm, self._xdmf, work)
+            if frame.n_files == 1:
+                write_on_first_rank(self.comm, self._xdmf, work)
+            else:
+                collectively(self.comm, lambda: written(self._xdmf, work), RunError)
+                write_on_first_rank(self.comm, self._xdmf, lambda: self._name(frame))
         except RunError:
+            frame.remove()
             self.shared.clear()
             raise
-        if text:
-            self._frames.append(text)
-            self._length += len(text)
+        if not frame.is_only_grid:
+            self._frames.append(frame.description)
+            self._length += len(self._frames[-1])
             self.n_frames += 1
 
     def close(self) -> None:
@@ -187,27 +197,35 @@ class Series:
                 ranks, else on the first one.
         """
         self._closed = True
-        comm = MPI.COMM_SELF if self._thread is None else self.comm
-        write_on_first_rank(comm, self._xdmf, self._complete)
+        try:
+            self.finish()
+        finally:
+            comm = MPI.COMM_SELF if self._thread is None else self.comm
+            write_on_first_rank(comm, self._xdmf, self._name_rest)
 
     def abandon(self) -> None:
-        """Complete the files as far as possible, without communication: this rank ends with an error."""
-        self._closed = True
-        if self.comm.rank == 0:
-            with suppress(OSError):
-                self._complete()
+        """Complete the files as far as possible, without communication: this rank ends with an error.
 
-    def _complete(self) -> None:
-        """Wait for the last frame, and name those that are not named yet."""
-        (work, text), self._unfinished = self._unfinished or (None, ""), None
-        try:
-            if work is not None:
-                work()
-                self._frames.append(text)
-        finally:
-            if self._unnamed:
-                self._unnamed = 0
-                self._replace_xdmf(self._collection())
+        A frame of several files is not named then, since other ranks may have failed to write theirs.
+        """
+        self._closed = True
+        unfinished, self._unfinished = self._unfinished, None
+        with suppress(OSError):
+            try:
+                if unfinished is not None:
+                    work, frame = unfinished
+                    if self.comm.rank < frame.n_files:
+                        work()
+                    if frame.n_files == 1 and not frame.is_only_grid:
+                        self._frames.append(frame.description)
+            finally:
+                self._name_rest()
+
+    def _name_rest(self) -> None:
+        """Name the frames that are not named yet."""
+        if self._unnamed:
+            self._unnamed = 0
+            self._replace_xdmf(self._collection())
 
 
 T = TypeVar("T", bound="Output")
@@ -239,21 +257,78 @@ class Output:
 
 
 class Frame:
-    """A file of a series that is being written."""
+    """A frame that is being written, to one file or to one of each of some ranks.
 
-    def __init__(self, file: RowsFile, address: str, real: np.dtype[Any]) -> None:
-        self._file, self._address, self._real = file, address, real
+    Args:
+        folder: of the files.
+        name: of the first file, without suffix.
+        comm: communicator of the ranks that have rows.
+        real: type of real numbers in the files.
+        compression: level of deflate.
+    """
+
+    def __init__(self, folder: Path, name: str, comm: MPI.Comm, real: np.dtype[Any], compression: int) -> None:
+        self._folder, self._name, self._comm = folder, name, comm
+        self._real, self._compression = real, compression
+        self._files: list[RowsFile] = []
+        self._bytes: list[int] = []
         self.text: list[str] = []
-        """Its description in the XDMF file"""
+        """What the XDMF file says of its points, cells and fields"""
+        self.description = ""
+        """All that the XDMF file says of it"""
+        self.is_only_grid = False
+        """Whether this is the only grid of the XDMF file, not one of a collection over time"""
+        self._add_file()
+
+    @property
+    def n_files(self) -> int:
+        """Number of files; each is written by the rank of its number."""
+        return len(self._files)
+
+    def _file_name(self, number: int) -> str:
+        return f"{self._name}-{number}.h5" if number else f"{self._name}.h5"
+
+    def _add_file(self) -> None:
+        path, writer = self._folder / self._file_name(self.n_files), self.n_files
+        self._files.append(RowsFile(str(path), self._comm, writer=writer, compression=self._compression))
+        self._bytes.append(0)
+
+    def wait(self) -> None:
+        """Wait until all fields are with the ranks that write them. Collective."""
+        for file in self._files:
+            file.wait()
+
+    def write(self) -> None:
+        """Write this rank's file.
+
+        Raises:
+            OSError: with path and reason: the file could not be written.
+        """
+        for file in self._files:
+            file.close()
+
+    def remove(self) -> None:
+        """Remove this rank's file."""
+        if self._comm.rank < self.n_files:
+            with suppress(OSError):
+                (self._folder / self._file_name(self._comm.rank)).unlink()
 
     def add_data(self, name: str, rows: NDArray[Any], counts: Sequence[int]) -> str:
         """Add a dataset; returns how the XDMF file names it. Collective."""
-        self._file.add(name, rows, counts)
+        n_bytes = sum(counts) * math.prod(rows.shape[1:]) * rows.dtype.itemsize
+        number = int(np.argmin(self._bytes))
+        if self._bytes[number] and self._bytes[number] + n_bytes > PART and self.n_files < self._comm.size:
+            number = self.n_files
+            self._add_file()
+        self._bytes[number] += n_bytes
+        self._files[number].add(name, rows, counts)
+        if number:
+            self._files[0].add_link(name, self._file_name(number))
         kind = "Float" if rows.dtype.kind == "f" else "Int"
         shape = " ".join(map(str, (sum(counts), *rows.shape[1:])))
         return (
             f'<DataItem Format="HDF" NumberType="{kind}" Precision="{rows.dtype.itemsize}" Dimensions="{shape}">'
-            f"{self._address}:/{name}</DataItem>"
+            f"{self._folder.name}/{self._file_name(number)}:/{name}</DataItem>"
         )
 
     def add_grid(self, kind: str, cells: str, n_cells: int, width: int, points: str) -> None:
