@@ -5,7 +5,7 @@ a fraction of the effective vertical stresses, as in an earthquake, and effectiv
 stresses stay, which equilibrium asks for, as far as the strength that is left carries them. Soil and water then move with separate
 velocities. Fine sand hardly drains while it flows; coarse sand drains as fast as it flows.
 
-As long as its pores are full, the sand keeps its volume (`volume_gain`) and flows out to a slope of some 5 degrees. Loose sand
+As long as its pores are full, the sand keeps its volume (`volume_gain`) and flows out until its surface is nearly level. Loose sand
 would contract and flow further, so that the run-out is a lower bound; dense sand would stop earlier. Use `--air-entry 0` for
 sand so coarse that it sustains no suction: it dilates where effective stresses would become tensile, and its pores empty.
 """

@@ -185,24 +185,21 @@ void take_step(Model<G>& model, const ExplicitOptions& options, double dt)
 template <class G>
 void choose_forces(Model<G>& model, Integration kind, Averages averages)
 {
-  const bool two_phases = has_two_phases(model); // then pore pressures are averaged too, and most of what is
-  const bool as_elements = averages == Averages::as_elements && !model.water; // elements with water average as steps do
-  const auto fraction = [&](const Law& law)
-  {
-    if (as_elements)
-      return fraction_of_averaged_forces(law);
-    return two_phases ? 1 : fraction_of_averages(law);
-  };
+  // Elements with water average as steps do. Beside water that moves by itself the soil averages as elements do: its
+  // volume is that of its pores, whose growth is averaged in full, so that it would lock by half; and forces that are
+  // averaged in full do not feel effective stresses that alternate from cell to cell, in which drained soil creeps.
+  const bool in_full = has_two_phases(model) || (averages == Averages::as_elements && !model.water);
   for (VelocityField<G>& field : model.fields)
   {
     field.integration.kind = kind;
     field.integration.averaged_by_law.clear();
     field.integration.averaged_of_cell.clear();
-    field.integration.strains_in_full = as_elements;
+    field.integration.strains_in_full = in_full;
     if (averages == Averages::none)
       continue;
     for (const Law& law : model.laws)
-      field.integration.averaged_by_law.push_back(fraction(law));
+      field.integration.averaged_by_law.push_back(in_full ? fraction_of_averaged_forces(law)
+                                                          : fraction_of_averages(law));
   }
 }
 

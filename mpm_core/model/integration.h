@@ -50,11 +50,12 @@ inline double averaged_volume(const Mesh<D>& mesh, const VelocityField<G>& field
   return averaged_fraction(field.integration, cell) * integrated_volume(mesh, field, cell);
 }
 
-/// The fraction of nodal mixed discretisation of the strains of a cell.
+/// The fraction of nodal mixed discretisation of the strains of a cell; none where no forces are averaged.
 template <int D>
 inline double averaged_strain_fraction(const CellIntegration<D>& integration, Index cell)
 {
-  return integration.strains_in_full ? 1 : averaged_fraction(integration, cell);
+  const double of_forces = averaged_fraction(integration, cell);
+  return integration.strains_in_full && of_forces > 0 ? 1 : of_forces;
 }
 
 /// The volume by which a cell takes part in the means of strains.

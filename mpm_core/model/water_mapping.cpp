@@ -172,7 +172,7 @@ void follow_soil(const Mesh<G::dim>& mesh, const VelocityField<G>& soil, WaterFi
   motion.part = soil.part;
   motion.least_mass = soil.least_mass;
   motion.integration.kind = soil.integration.kind;
-  motion.integration.averaged_by_law = soil.integration.averaged_by_law;
+  motion.integration.averaged_by_law.assign(soil.integration.averaged_by_law.size(), 1.0); // pressures in full
   motion.moments.resize(cells);
   motion.nodes.resize(nodes);
   motion.volumetric_strain.resize(nodes);

@@ -21,7 +21,8 @@ bool is_non_associated(const Law& law);
 /// strength.
 double fraction_of_averages(const Law& law);
 
-/// Fraction by which finite elements and steps in small displacements average the forces of a soil whose strains they
-/// average in full: a half without dilation, and all in associated flow. Averaged by less, tension alternates.
+/// Fraction by which finite elements, steps in small displacements and steps with separate velocities of soil and water
+/// average the forces of a soil whose strains they average in full: a half without dilation, and all in associated
+/// flow. Averaged by less, tension alternates.
 double fraction_of_averaged_forces(const Law& law);
 } // namespace mpm::materials
