@@ -6,7 +6,6 @@ import math
 from collections.abc import Collection
 from typing import Any
 
-
 import mpm_core as mpm
 from fenics_bridge.errors import InputError, is_finite
 from fenics_bridge.types import Laws

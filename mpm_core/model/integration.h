@@ -35,6 +35,13 @@ inline double integration_factor(const Mesh<D>& mesh, const VelocityField<G>& fi
   return integrated_volume(mesh, field, cell) / field.moments[cell].volume;
 }
 
+/// Whether forces are averaged over nodes; strains may be without them.
+template <int D>
+inline bool has_averaged_forces(const CellIntegration<D>& integration)
+{
+  return !integration.averaged_by_law.empty();
+}
+
 /// The fraction of nodal mixed discretisation in a cell, that of its forces.
 template <int D>
 inline double averaged_fraction(const CellIntegration<D>& integration, Index cell)

@@ -140,7 +140,7 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
                                        field.tractions, of_resting_cells, field.nodes,
                                        2 * field.least_mass); // twice: sums of several cells have round-off
   };
-  if (!field.integration.averaged_by_law.empty())
+  if (has_averaged_forces(field.integration))
   {
     average_stress_of_soils(mesh, exchange, runs, field);
     const auto averaged = [&](Index c)
@@ -242,7 +242,7 @@ void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, const std::vec
                      VelocityField<G>& field)
 {
   // Averages of stress have found the volumes, and left them side by side.
-  const bool known = !field.integration.averaged_by_law.empty() && !field.integration.strains_in_full;
+  const bool known = has_averaged_forces(field.integration) && !field.integration.strains_in_full;
   const auto volume_of = [&](Index c)
   { return known ? field.integration.mean_stress_of_cell[c].volume : averaged_strain_volume(mesh, field, c); };
   with_values_of_vertices(mesh, field,

@@ -17,13 +17,6 @@ double damped_time_step(const Rayleigh& rayleigh, double critical)
 
 namespace
 {
-/// Whether the strains of the field are averaged over nodes.
-template <class G>
-bool is_averaged(const VelocityField<G>& field)
-{
-  return !field.integration.averaged_by_law.empty();
-}
-
 /// beta times the rate of elastic stress of a cell, by the velocities at the start.
 template <class G, int D = G::dim>
 Working<G> viscous_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell, const WaveModuli& moduli,
@@ -38,7 +31,7 @@ Working<G> viscous_stress(const Mesh<D>& mesh, const VelocityField<G>& field, In
   for (int i = 0; i < D; ++i)
     trace += velocity.gradient[i][i];
   trace += hoop;
-  const double averaged = is_averaged(field) ? averaged_strain(mesh, field, cell, trace) : trace;
+  const double averaged = has_averaged_forces(field.integration) ? averaged_strain(mesh, field, cell, trace) : trace;
   const double mean = lambda * averaged + 2 * mu * (averaged - trace) / G::n_normal;
   Working<G> stress;
   for (int s = 0; s < n_symmetric<D>; ++s)
@@ -92,7 +85,7 @@ void add_run(const Mesh<D>& mesh, const MaterialPoints<D>& points, const Run& ru
 template <class G, int D = G::dim>
 void add_stress_forces(Model<G>& model, std::vector<Working<G>>& stress, VelocityField<G>& field)
 {
-  if (is_averaged(field))
+  if (has_averaged_forces(field.integration))
     average_stresses<G>(model.mesh, model.exchange, field, stress);
   for (Index c : field.part.cells)
     for (int k = 0; k <= D; ++k)
@@ -112,9 +105,9 @@ void add_rayleigh_forces(Model<G>& model, const Rayleigh& rayleigh, VelocityFiel
   if (rayleigh.mass == 0 && rayleigh.stiffness == 0)
     return;
   field.damping_force.assign(field.nodes.size(), {});
-  if (rayleigh.stiffness > 0 && is_averaged(field))
+  if (rayleigh.stiffness > 0 && has_averaged_forces(field.integration))
     average_strains(model.mesh, model.exchange, field.start_velocity, 1.0, field); // rates
-  std::vector<Working<G>> stress(static_cast<std::size_t>(model.mesh.owned_cells));
+  std::vector<Working<G>> stress(rayleigh.stiffness > 0 ? static_cast<std::size_t>(model.mesh.owned_cells) : 0);
   for (const MaterialPoints<D>& points : {material_points(model), resting_points(model)})
     for (const Run& run : points.runs)
       if (&field_of(model, run.material) == &field)

@@ -43,7 +43,8 @@ struct CellIntegration
   /// By law: fraction of nodal mixed discretisation in a cell with its soil alone, of its strains and, by their
   /// transpose, of its forces. Empty where strains are averaged in full, and forces not.
   std::vector<double> averaged_by_law;
-  bool strains_in_full = false; ///< strains are averaged in full, whatever the fractions, which are those of forces
+  /// Strains are averaged in full wherever forces are averaged, by whatever fraction.
+  bool strains_in_full = false;
   std::vector<double> averaged_of_cell; ///< per owned cell: the fraction of averaging; empty where it is one everywhere
   std::vector<NodeMass> masses;         ///< scratch, per node
   std::vector<VolumeMean> mean_stress_of_cell; ///< scratch: integral and volume
