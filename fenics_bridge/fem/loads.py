@@ -20,6 +20,7 @@ from fenics_bridge.errors import agree
 from fenics_bridge.fem.fields import assembled
 from fenics_bridge.fem.geometry import weighted
 from fenics_bridge.mesh.names import by_number, label, tag_numbers
+from fenics_bridge.mesh.tagged import numbered_anew
 from fenics_bridge.types import MeshTags
 
 
@@ -131,13 +132,14 @@ def pressing(domain: Mesh, pressure: Any, test: Any, facet_tags: MeshTags, tags:
         tags: numbers of those that it presses on; where soil ends inside of the mesh, facets in there too.
         there: function that is 1 in cells that are there and 0 in those that are not; None where all are.
     """
-    normal, ds = ufl.FacetNormal(domain), ufl.Measure("ds", domain=domain, subdomain_data=facet_tags)
+    pressed = numbered_anew(domain, facet_tags, [np.atleast_1d(tags)])
+    normal, ds = ufl.FacetNormal(domain), ufl.Measure("ds", domain=domain, subdomain_data=pressed)(1)
     if there is None:
-        return -pressure * ufl.inner(normal, test) * ds(tags)
+        return -pressure * ufl.inner(normal, test) * ds
     outward = there("+") * normal("+") + there("-") * normal("-")  # between two cells that are there it cancels
-    inside = ufl.Measure("dS", domain=domain, subdomain_data=facet_tags)
-    within = pressure("+") * ufl.inner(outward, test("+")) * inside(tags)
-    return -there * pressure * ufl.inner(normal, test) * ds(tags) - within
+    inside = ufl.Measure("dS", domain=domain, subdomain_data=pressed)(1)
+    within = pressure("+") * ufl.inner(outward, test("+")) * inside
+    return -there * pressure * ufl.inner(normal, test) * ds - within
 
 
 class LoadVectors:
@@ -266,8 +268,9 @@ class LoadVectors:
 
     def _unit_weight_of(self, tag: Any) -> Any:
         if tag not in self._weight:
-            dx = ufl.Measure("dx", domain=self._space.mesh, subdomain_data=self._cell_tags)
-            self._weight[tag] = self._unit_weight(dx(tag))
+            domain = self._space.mesh
+            of_tag = numbered_anew(domain, self._cell_tags, [[tag]])
+            self._weight[tag] = self._unit_weight(ufl.Measure("dx", domain=domain, subdomain_data=of_tag)(1))
         return self._weight[tag]
 
     def _unit_pressure(self, tag: Any) -> Any:
@@ -282,13 +285,12 @@ class LoadVectors:
         """Nodal forces of 1 Pa along each axis."""
         if tag not in self._traction:
             domain = self._space.mesh
-            ds = ufl.Measure("ds", domain=domain, subdomain_data=self._facet_tags)
+            of_tag = numbered_anew(domain, self._facet_tags, [[tag]])
+            ds = ufl.Measure("ds", domain=domain, subdomain_data=of_tag)(1)
             there = 1.0 if self.active is None else self.active
             self._traction[tag] = [
                 assembled(
-                    fem.form(
-                        weighted(there * ufl.inner(fem.Constant(domain, axis), self._test), self._radius) * ds(tag)
-                    ),
+                    fem.form(weighted(there * ufl.inner(fem.Constant(domain, axis), self._test), self._radius) * ds),
                     self._space,
                 ).array.copy()
                 for axis in np.eye(domain.geometry.dim)

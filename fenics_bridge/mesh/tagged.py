@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from dolfinx.mesh import Mesh
+from dolfinx.mesh import Mesh, meshtags
 from mpi4py import MPI
 from numpy.typing import NDArray
 
@@ -107,3 +108,21 @@ def tag_values(domain: Mesh, tags: MeshTags | None, dim: int) -> NDArray[np.int3
     if tags is not None:
         values[tags.indices] = tags.values
     return values
+
+
+def numbered_anew(domain: Mesh, tags: MeshTags, groups: Sequence[Sequence[int]]) -> MeshTags:
+    """Tags by which a form reads the same, and is compiled once, whatever the numbers of the tags that it is made for.
+
+    Args:
+        domain: mesh of the tags.
+        tags: tags of its cells or facets.
+        groups: numbers of the tags of each group, none in two groups.
+
+    Returns:
+        Tags that are 1 in the first group, 2 in the second and so on; the rest is untagged.
+    """
+    values = np.zeros(len(tags.values), dtype=np.int32)
+    for number, group in enumerate(groups, start=1):
+        values[np.isin(tags.values, group)] = number
+    there = values > 0
+    return meshtags(domain, tags.dim, tags.indices[there], values[there])

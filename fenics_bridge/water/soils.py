@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.errors import InputError, agree, is_finite
 from fenics_bridge.mesh.names import by_number, label
-from fenics_bridge.mesh.tagged import owned_cells, tag_values
+from fenics_bridge.mesh.tagged import numbered_anew, owned_cells, tag_values
 from fenics_bridge.types import MeshTags
 from fenics_bridge.water.retention import AlwaysSaturated
 
@@ -174,11 +174,11 @@ def soils_by_tag(
     known = set().union(*comm.allgather(set(values.tolist())))
     without = sorted(known - set(by_tag))
     agree(comm, f"soil: none for cells with tag {label(cell_tags, without[0])} (0: untagged)" if without else None)
-    dx = ufl.Measure("dx", domain=domain, subdomain_data=cell_tags)
     wet = [tag for tag, one in by_tag.items() if one is not None]
     agree(comm, None if wet else "soil is None for all cells, expected a PorousSoil for some")
     cells = [np.flatnonzero(values == tag).astype(np.int32) for tag in wet]
-    return [_under(by_tag[tag], gravity) for tag in wet], [dx(tag) for tag in wet], cells
+    dx = ufl.Measure("dx", domain=domain, subdomain_data=numbered_anew(domain, cell_tags, [[tag] for tag in wet]))
+    return [_under(by_tag[tag], gravity) for tag in wet], [dx(1 + i) for i in range(len(wet))], cells
 
 
 def _under(soil: Any, gravity: float) -> Any:
