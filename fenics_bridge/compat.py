@@ -49,7 +49,8 @@ def create_mesh(comm: MPI.Comm, points: NDArray[np.float64], cells: NDArray[np.i
         element = ufl.Mesh(basix_ufl.element("Lagrange", SHAPE[dim], 1, shape=(dim,)))
         return mesh.create_mesh(comm, cells=cells, x=points, e=element, partitioner=_partitioner())
     cell = ufl.Cell(SHAPE[dim], geometric_dimension=dim)
-    element = ufl.Mesh(ufl.VectorElement("Lagrange", cell, 1))
+    # FFCx gives the mesh of a form that it compiles this variant: named at once, forms have one name in the cache, not two.
+    element = ufl.Mesh(ufl.VectorElement("Lagrange", cell, 1, variant="equispaced"))
     return mesh.create_mesh(comm, cells, points, element, ghost_mode=GhostMode.shared_facet)
 
 

@@ -1,6 +1,8 @@
 """Forms whose compilation a killed run has broken off: the file that it left is named, and after some time it is removed."""
 
 import os
+import subprocess
+import sys
 import time
 
 import pytest
@@ -9,6 +11,7 @@ from dolfinx import fem
 from dolfinx.mesh import create_unit_square
 from mpi4py import MPI
 
+import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge.forms import ABANDONED
 
@@ -44,3 +47,27 @@ def test_an_old_file_is_removed_and_the_form_compiled(broken_off):
     os.utime(source, (before, before))
     assert area(cache) == pytest.approx(1.0)
     assert source.with_suffix(".c.cached").exists()
+
+
+LOADED = """
+import sys
+import mpm_core as mpm
+from mpi4py import MPI
+import fenics_bridge as bridge
+domain, _, facet_tags = bridge.soil_mesh(*bridge.slope_mesh(MPI.COMM_SELF, height=1.0, angle=45.0, crest=1.0, cell_size=0.5))
+law = mpm.LinearElastic(young=1e6, poisson=0.3)
+model = bridge.QuasiStatic(domain, law, facet_tags, [bridge.fixed(bridge.BASE)])
+tags = [int(tag) for tag in sys.argv[1:]]
+model.solve(bridge.Load(1e4, dict.fromkeys(tags, 1e3), traction={tag: (1e2, 0.0) for tag in tags}))
+"""
+
+
+def test_a_form_is_compiled_once_for_all_tags(tmp_path):
+    """The tags' numbers are not part of the forms, and a second run finds what the first compiled."""
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    compiled = []
+    for tags in ((bridge.SLOPE,), (bridge.SLOPE,), (bridge.CREST, bridge.LEFT)):
+        tags = [str(tag) for tag in tags]
+        subprocess.run([sys.executable, "-c", LOADED, *tags], timeout=240, check=True, env=environment)
+        compiled.append({path.name for path in (tmp_path / "fenics").glob("libffcx_*.c")})
+    assert compiled[0] and compiled[1] == compiled[0] == compiled[2]
