@@ -287,23 +287,24 @@ class Seepage:
 
     def velocity(self) -> fem.Function:
         """Darcy velocity q [m/s] as a function that is polynomial in each cell."""
-        psi = self.pressure_head
-        space = compat.function_space(self.domain, "DG", self._degree - 1, self._dim)
+        psi, dim = self.pressure_head, self._dim
+        space = compat.function_space(self.domain, "DG", self._degree - 1, dim)
         result = fem.Function(space, name="velocity")
+        velocities, dofs = result.x.array.reshape(-1, dim), compat.cell_dofs(space)
+        head = fem.Expression(ufl.as_vector([psi, *(ufl.grad(psi) + self._up)]), compat.interpolation_points(space))
         for soil, own in zip(self._soils, self._cells):
-            k = ufl.as_matrix(soil.tensor(soil.conductivity, self._dim).tolist())
-            flow = -soil.retention.relative_permeability(-self.unit_weight * psi) * k * (ufl.grad(psi) + self._up)
-            result.interpolate(fem.Expression(flow, compat.interpolation_points(space)), own)
+            there = compat.expression_values(head, self.domain, own).reshape(len(own), -1, 1 + dim)
+            permeability = soil.retention.relative_permeability(-self.unit_weight * there[..., :1])
+            velocities[dofs[own]] = -permeability * (there[..., 1:] @ soil.tensor(soil.conductivity, dim).T)
         return result
 
     def saturation(self) -> fem.Function:
         """Degree of saturation [-] at the nodes; where soils meet, that of the last of them."""
         psi = self.pressure_head
-        result = fem.Function(psi.function_space, name="saturation")
-        points = compat.interpolation_points(psi.function_space)
+        result, dofs = fem.Function(psi.function_space, name="saturation"), compat.cell_dofs(psi.function_space)
         for soil, own in zip(self._soils, self._cells):
-            degree = fem.Constant(self.domain, 1.0) * soil.retention.saturation(-self.unit_weight * psi)
-            result.interpolate(fem.Expression(degree, points), own)
+            nodes = np.unique(dofs[own])
+            result.x.array[nodes] = soil.retention.saturation(-self.unit_weight * psi.x.array[nodes])
         result.x.scatter_forward()
         return result
 
