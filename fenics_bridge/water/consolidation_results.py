@@ -10,7 +10,6 @@ from dolfinx import fem
 from dolfinx.mesh import Mesh
 from numpy.typing import ArrayLike, NDArray
 
-from fenics_bridge import compat
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
 from fenics_bridge.fem.fields import SupportedBody, nodal_average, part_of
@@ -22,6 +21,7 @@ from fenics_bridge.water.applied import AppliedBoundary
 from fenics_bridge.water.coupled import WaterTerms
 from fenics_bridge.water.motion import Motion
 from fenics_bridge.water.positions import at_positions
+from fenics_bridge.water.soils import acting_pressure
 
 
 class ConsolidationResults(SupportedBody, PointFunctions):
@@ -94,12 +94,8 @@ class ConsolidationResults(SupportedBody, PointFunctions):
         Returns:
             Function of positions (n, D) [m] that returns pressures (n,) [Pa]; every rank must call it.
         """
-        acting = fem.Function(self.pressure.function_space, name="pore_pressure")
-        acting.x.array[:] = np.maximum(self.pressure.x.array, 0.0)
-        for soil, cells in zip(self._soils[0], self._soils[2]) if suction else ():
-            part = soil.retention.effective(-self.pressure) * self.pressure
-            acting.interpolate(fem.Expression(part, compat.interpolation_points(acting.function_space)), cells)
-        return at_positions(acting, outside)
+        soils, _, cells = self._soils
+        return at_positions(acting_pressure(self.pressure, soils, cells, suction), outside)
 
     def stored_water(self) -> float:
         """Volume of water in the body [m3], at atmospheric pressure; [m2] in plane strain, in axial symmetry per radian. Collective."""

@@ -32,7 +32,7 @@ from fenics_bridge.types import MeshTags
 from fenics_bridge.water.boundary import Reservoir, value_at
 from fenics_bridge.water.motion import Motion
 from fenics_bridge.water.retention import AlwaysSaturated
-from fenics_bridge.water.soils import PorousSoil, Water
+from fenics_bridge.water.soils import PorousSoil, Water, as_constants
 
 
 class Element(Enum):
@@ -84,10 +84,10 @@ class WaterTerms:
     ) -> None:
         self._domain = domain = solution.function_space.mesh
         self._up = ufl.as_vector([0.0] * (domain.geometry.dim - 1) + [1.0])
-        self._dim, self._increment, self._unit, self._radius = domain.geometry.dim, increment, unit, radius
-        self._there, self._motion = there, motion
-        self._driving = self._up + motion.at_end / water.gravity if motion else self._up
-        self._soils, self._gamma, self._modulus = soils, water.unit_weight, water.modulus
+        self._dim, self._increment, self._radius = domain.geometry.dim, increment, radius
+        self._there, self._motion, self._soils, self._water = there, motion, as_constants(domain, soils), water
+        self._unit, self._gamma, gravity = (fem.Constant(domain, v) for v in (unit, water.unit_weight, water.gravity))
+        self._driving = self._up + motion.at_end / gravity if motion else self._up
         rule = {"quadrature_degree": degree}
         curved = [_may_dry(soil) for soil in soils]
         self._measures = [dx(metadata=UNSATURATED if dry else rule) for dx, dry in zip(measures, curved)]
@@ -125,7 +125,7 @@ class WaterTerms:
             space = function.function_space
             test = ufl.TestFunction(space)
             form = fem.form(self._sum(lambda soil: density(soil, self._p) * test))
-            moments = self._unit * assembled(form, space).array
+            moments = self._unit.value * assembled(form, space).array
             dofs = compat.cell_dofs(space)[: len(volume)]
             of_cells = moments[dofs]
             if function is lost:  # the inverse of the integrals of N_k N_l
@@ -142,10 +142,11 @@ class WaterTerms:
             forces = self._sum(lambda s: self._pressing(s, end) * self._volume(v) + self._missing(s, end, v))
             if self._motion is not None:
                 acceleration = self._motion.at_end
-                forces -= self._sum(lambda s: ((s.density or 0.0) / self._unit) * ufl.inner(acceleration, v))
+                forces -= self._sum(lambda s: (s.density / self._unit) * ufl.inner(acceleration, v))
             water = self._sum(lambda s: q * self._stored(s), self._storing)
             pushed = (self._unit / self._gamma) * ufl.grad(end)
-            water += self.dt * (self._flow(pushed + self._driving, q, end) - applied.unit * applied.inflow_form(q))
+            inflow = fem.Constant(self._domain, applied.unit) * applied.inflow_form(q)
+            water += self.dt * (self._flow(pushed + self._driving, q, end) - inflow)
             spread = ufl.as_matrix(
                 [[self.projection[i * self._dim + j] for j in range(self._dim)] for i in range(self._dim)]
             )
@@ -158,13 +159,12 @@ class WaterTerms:
     def gravity_flow(self, space: Any) -> NDArray[np.float64]:
         """Flow of the water in 1 s by its own weight, as part of the internal forces: (m,). Collective."""
         q = ufl.TestFunctions(space)[1]
-        return self._unit * assembled(fem.form(self._flow(self._up, q, 0.0)), space).array
+        return self._unit.value * assembled(fem.form(self._flow(self._up, q, 0.0)), space).array
 
     def _flow(self, gradient: Any, q: Any, pressure: Any) -> Any:
         def density(soil: PorousSoil) -> Any:
-            k = ufl.as_matrix(soil.tensor(soil.conductivity, self._dim).tolist())
             through = soil.retention.relative_permeability(-self._unit * pressure) if _may_dry(soil) else 1.0
-            return through * ufl.inner(k * gradient, ufl.grad(q))
+            return through * ufl.inner(soil.conductivity * gradient, ufl.grad(q))
 
         return self._sum(density)
 
@@ -204,7 +204,7 @@ class WaterTerms:
         return dilation(u, self._radius)
 
     def _storage(self, soil: PorousSoil) -> Any:
-        return self._unit * soil.porosity / self._modulus
+        return self._unit * soil.porosity * (1 / self._water.modulus)
 
 
 def pressure_is_free(space: Any, constraints: Any, radius: Any, there: Any) -> bool:

@@ -93,7 +93,7 @@ class VanGenuchten(_Curve):
 
     def _powers(self, suction: Any) -> Any:
         """(alpha s)^n at the suction and at the air entry."""
-        entry = max(self.alpha * self.air_entry, _SMALL)
+        entry = _at_least(self.alpha * self.air_entry, _SMALL)
         return _at_least(suction * self.alpha, entry) ** self.n, entry**self.n
 
     def effective(self, suction: Any) -> Any:
@@ -303,11 +303,11 @@ def _joined(x: Any, places: Any, values: Any) -> Any:
     """Straight lines between points; the first and the last value outside of them."""
     if not isinstance(x, Expr):
         return np.interp(x, places, values)
-    result = ufl.as_ufl(float(values[-1]))
+    result = ufl.as_ufl(values[-1])
     for k in reversed(range(len(places) - 1)):
         slope = (values[k + 1] - values[k]) / (places[k + 1] - places[k])
         result = ufl.conditional(ufl.lt(x, places[k + 1]), values[k] + slope * (x - places[k]), result)
-    return ufl.conditional(ufl.lt(x, places[0]), ufl.as_ufl(float(values[0])), result)
+    return ufl.conditional(ufl.lt(x, places[0]), ufl.as_ufl(values[0]), result)
 
 
 def _check_positive(name: str, value: float, unit: str) -> None:

@@ -31,7 +31,15 @@ from fenics_bridge.water.applied import AppliedBoundary
 from fenics_bridge.water.boundary import WaterBoundary, listed
 from fenics_bridge.water.complementarity import BoundedProblem
 from fenics_bridge.water.positions import at_positions
-from fenics_bridge.water.soils import WATER_MODULUS, PorousSoil, given_water, soils_by_tag
+from fenics_bridge.water.soils import (
+    WATER_MODULUS,
+    PorousSoil,
+    acting_pressure,
+    as_constants,
+    given_water,
+    set_by_soil,
+    soils_by_tag,
+)
 
 QUADRATURE = {1: 3, 2: 5}
 """Degree of the quadrature by the degree of the elements; permeabilities that vary within a cell have no exact one."""
@@ -100,6 +108,7 @@ class Seepage:
         self._up = ufl.as_vector([0.0] * (self._dim - 1) + [1.0])
         self._dt, self._sharpness = fem.Constant(domain, 1.0), fem.Constant(domain, 1.0)
         self._soils, self._measures, self._cells = soils_by_tag(domain, soil, cell_tags, gravity=gravity)
+        self._of_forms = as_constants(domain, self._soils)
         self._largest = max(np.linalg.eigvalsh(s.tensor(s.conductivity, self._dim)).max() for s in self._soils)
         self._applied = AppliedBoundary(space, facet_tags, self._largest)
         self._steady, self._transient, self._stored, self._prefix = None, None, None, options_prefix
@@ -223,18 +232,18 @@ class Seepage:
     def _problem(self, transient: bool) -> Any:
         psi, test = self.pressure_head, ufl.TestFunction(self.pressure_head.function_space)
         trial = ufl.TrialFunction(self.pressure_head.function_space)
-        form, lagged = 0, 0
-        for soil, dx in zip(self._soils, self._measures):
-            k = ufl.as_matrix((soil.tensor(soil.conductivity, self._dim) / self._largest).tolist())
+        form, lagged, largest = 0, 0, fem.Constant(self.domain, self._largest)
+        for soil, dx in zip(self._of_forms, self._measures):
+            k = soil.conductivity / largest
             permeability = soil.retention.relative_permeability(-self._sharpness * self.unit_weight * psi)
             flow = dx(metadata={"quadrature_degree": QUADRATURE[self._degree]})
             form += permeability * ufl.inner(k * (ufl.grad(psi) + self._up), ufl.grad(test)) * flow
             lagged += permeability * ufl.inner(k * ufl.grad(trial), ufl.grad(test)) * flow
             if transient:
                 change = self._change_of_water(soil)
-                form += change / (self._largest * self._dt) * test * self._lumped(dx)
+                form += change / (largest * self._dt) * test * self._lumped(dx)
                 slope = ufl.derivative(change, psi, trial)
-                lagged += slope / (self._largest * self._dt) * test * self._lumped(dx)
+                lagged += slope / (largest * self._dt) * test * self._lumped(dx)
         form -= self._applied.inflow_form(test)
         return BoundedProblem(form, [ufl.derivative(form, psi, trial), lagged], psi, self._prefix)
 
@@ -248,7 +257,7 @@ class Seepage:
 
     def _held(self, soil: PorousSoil, psi: Any, load: Any) -> Any:
         """Water [-] by which saturated soil has more than its porosity."""
-        storage = soil.porosity / self.water_modulus + soil.compressibility
+        storage = soil.porosity * (1 / self.water_modulus) + soil.compressibility
         held = storage * self.unit_weight * psi
         return held if self._loading is None else held - soil.compressibility * load
 
@@ -281,7 +290,7 @@ class Seepage:
     def stored_water(self) -> float:
         """Volume of water in the body [m3], [m2] in plane flow, at atmospheric pressure. Collective."""
         if self._stored is None:
-            content = [self._water_content(soil, self.pressure_head, self._load) for soil in self._soils]
+            content = [self._water_content(soil, self.pressure_head, self._load) for soil in self._of_forms]
             self._stored = fem.form(sum(water * self._lumped(dx) for water, dx in zip(content, self._measures)))
         return self.domain.comm.allreduce(fem.assemble_scalar(self._stored))
 
@@ -301,11 +310,9 @@ class Seepage:
     def saturation(self) -> fem.Function:
         """Degree of saturation [-] at the nodes; where soils meet, that of the last of them."""
         psi = self.pressure_head
-        result, dofs = fem.Function(psi.function_space, name="saturation"), compat.cell_dofs(psi.function_space)
-        for soil, own in zip(self._soils, self._cells):
-            nodes = np.unique(dofs[own])
-            result.x.array[nodes] = soil.retention.saturation(-self.unit_weight * psi.x.array[nodes])
-        result.x.scatter_forward()
+        result = fem.Function(psi.function_space, name="saturation")
+        degree = lambda soil, nodes: soil.retention.saturation(-self.unit_weight * psi.x.array[nodes])
+        set_by_soil(result, self._soils, self._cells, degree)
         return result
 
     def pore_pressure(self, suction: bool = False, outside: OfPosition | None = None) -> OfPosition:
@@ -319,21 +326,6 @@ class Seepage:
         Returns:
             Function of positions (n, D) [m] that returns pressures (n,) [Pa]; every rank must call it.
         """
-        effective = (
-            [s.retention.effective(-self.unit_weight * self.pressure_head) for s in self._soils] if suction else None
-        )
-        return at_positions(self._pressure(effective), outside)
-
-    def _pressure(self, effective: Any) -> Any:
-        """Pore pressure [Pa]: continuous and cut off at zero or, with effective saturations, with that part of the suction."""
-        psi = self.pressure_head
-        result = fem.Function(psi.function_space, name="pore_pressure")
-        result.x.array[:] = self.unit_weight * np.maximum(psi.x.array, 0.0)
-        if effective is None:
-            return result
-        for soil_effective, cells in zip(effective, self._cells):
-            own = fem.Expression(
-                self.unit_weight * psi * soil_effective, compat.interpolation_points(psi.function_space)
-            )
-            result.interpolate(own, cells)
-        return result
+        pressure = fem.Function(self.pressure_head.function_space)
+        pressure.x.array[:] = self.unit_weight * self.pressure_head.x.array
+        return at_positions(acting_pressure(pressure, self._soils, self._cells, suction), outside)

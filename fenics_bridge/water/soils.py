@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
+from dolfinx import fem
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from mpm_core.retention import curve_values
@@ -14,6 +17,7 @@ from mpm_core.setup_warnings import warn_of_water_density
 from mpm_core.water_checks import LABORATORY_GRAVITY
 from numpy.typing import ArrayLike, NDArray
 
+from fenics_bridge import compat
 from fenics_bridge.errors import InputError, agree, is_finite
 from fenics_bridge.mesh.names import by_number, label
 from fenics_bridge.mesh.tagged import numbered_anew, owned_cells, tag_values
@@ -179,6 +183,67 @@ def soils_by_tag(
     cells = [np.flatnonzero(values == tag).astype(np.int32) for tag in wet]
     dx = ufl.Measure("dx", domain=domain, subdomain_data=numbered_anew(domain, cell_tags, [[tag] for tag in wet]))
     return [_under(by_tag[tag], gravity) for tag in wet], [dx(1 + i) for i in range(len(wet))], cells
+
+
+def as_constants(domain: Mesh, soils: Sequence[Any]) -> list[Any]:
+    """Soils for forms: all numbers are constants, so that forms are compiled once, not for each value of a parameter.
+
+    Args:
+        domain: mesh of the forms.
+        soils: soils, as of `soils_by_tag`.
+
+    Returns:
+        Copies of them. The conductivity is a tensor, shape (D, D) [m/s].
+    """
+    dim = domain.geometry.dim
+    return [_constant(domain, replace(s, conductivity=s.tensor(s.conductivity, dim))) for s in soils]
+
+
+def _constant(domain: Mesh, value: Any) -> Any:
+    """A number, an array, or the copy of a soil or a curve, whose checks are passed by, for forms."""
+    if is_dataclass(value):
+        result = copy(value)
+        for each in fields(value):
+            object.__setattr__(result, each.name, _constant(domain, getattr(value, each.name)))
+        return result
+    if isinstance(value, tuple):
+        return tuple(_constant(domain, each) for each in value)
+    return None if value is None else fem.Constant(domain, np.asarray(value, dtype=np.float64))
+
+
+def set_by_soil(function: fem.Function, soils: Sequence[Any], cells: Sequence[NDArray[np.int32]], values: Any) -> None:
+    """Sets a continuous function at the nodes of each soil; where soils meet, the last one counts. Collective.
+
+    Args:
+        function: the function.
+        soils: soils, as of `soils_by_tag`.
+        cells: their cells on this rank, likewise.
+        values: function of a soil and of rows of `function.x.array` (m,) that returns their values (m,).
+    """
+    dofs = compat.cell_dofs(function.function_space)
+    for soil, own in zip(soils, cells):
+        nodes = np.unique(dofs[own])
+        function.x.array[nodes] = values(soil, nodes)
+    function.x.scatter_forward()
+
+
+def acting_pressure(
+    pressure: fem.Function, soils: Sequence[Any], cells: Sequence[NDArray[np.int32]], suction: bool
+) -> fem.Function:
+    """Pore pressure [Pa] as it acts on the skeleton, a continuous function. Collective.
+
+    Args:
+        pressure: pore pressure [Pa], negative under suction.
+        soils: soils, as of `soils_by_tag`.
+        cells: their cells on this rank, likewise.
+        suction: False for zero where the pressure is negative; True for the suction there times the effective saturation.
+    """
+    p = pressure.x.array
+    acting = fem.Function(pressure.function_space, name="pore_pressure")
+    acting.x.array[:] = np.maximum(p, 0.0)
+    if suction:
+        set_by_soil(acting, soils, cells, lambda soil, nodes: soil.retention.effective(-p[nodes]) * p[nodes])
+    return acting
 
 
 def _under(soil: Any, gravity: float) -> Any:

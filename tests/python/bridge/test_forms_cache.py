@@ -49,25 +49,46 @@ def test_an_old_file_is_removed_and_the_form_compiled(broken_off):
     assert source.with_suffix(".c.cached").exists()
 
 
-LOADED = """
+BODY = """
 import sys
 import mpm_core as mpm
 from mpi4py import MPI
 import fenics_bridge as bridge
-domain, _, facet_tags = bridge.soil_mesh(*bridge.slope_mesh(MPI.COMM_SELF, height=1.0, angle=45.0, crest=1.0, cell_size=0.5))
-law = mpm.LinearElastic(young=1e6, poisson=0.3)
-model = bridge.QuasiStatic(domain, law, facet_tags, [bridge.fixed(bridge.BASE)])
+from fenics_bridge import water
+domain, _, facets = bridge.soil_mesh(*bridge.slope_mesh(MPI.COMM_SELF, height=1.0, angle=45.0, crest=1.0, cell_size=0.5))
+law, base = mpm.LinearElastic(young=1e6, poisson=0.3), [bridge.fixed(bridge.BASE)]
+"""
+LOADED = """
 tags = [int(tag) for tag in sys.argv[1:]]
+model = bridge.QuasiStatic(domain, law, facets, base)
 model.solve(bridge.Load(1e4, dict.fromkeys(tags, 1e3), traction={tag: (1e2, 0.0) for tag in tags}))
+"""
+WET = """
+alpha, n, conductivity = map(float, sys.argv[1:])
+soil = water.PorousSoil(conductivity, 0.4, 1e-7, water.VanGenuchten(alpha, n, n / 10))
+outside = [water.Reservoir(bridge.LEFT, 0.8), water.SeepageFace(bridge.SLOPE)]
+flow = water.Seepage(domain, soil, facets, outside)
+flow.solve()
+assert flow.advance(60.0)
+body = water.Consolidation(domain, law, soil, facets, base, outside, bridge.Load(2e4), water.Element.STABILISED)
+body.initialise(pore_pressure=flow.pore_pressure(suction=True))
+body.advance(60.0)
 """
 
 
-def test_a_form_is_compiled_once_for_all_tags(tmp_path):
-    """The tags' numbers are not part of the forms, and a second run finds what the first compiled."""
+@pytest.mark.parametrize(
+    "study, arguments",
+    [
+        pytest.param(LOADED, [(bridge.SLOPE,), (bridge.SLOPE,), (bridge.CREST, bridge.LEFT)], id="tags"),
+        pytest.param(WET, [(2e-4, 1.6, 1e-5), (3e-4, 2.3, 4e-6)], id="soils"),
+    ],
+)
+def test_a_form_is_compiled_once_for_all_values(study, arguments, tmp_path):
+    """Numbers of tags and parameters of soils are not part of the forms, and later runs find what the first compiled."""
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
     compiled = []
-    for tags in ((bridge.SLOPE,), (bridge.SLOPE,), (bridge.CREST, bridge.LEFT)):
-        tags = [str(tag) for tag in tags]
-        subprocess.run([sys.executable, "-c", LOADED, *tags], timeout=240, check=True, env=environment)
+    for values in arguments:
+        run = [sys.executable, "-c", BODY + study, *map(str, values)]
+        subprocess.run(run, timeout=240, check=True, env=environment)
         compiled.append({path.name for path in (tmp_path / "fenics").glob("libffcx_*.c")})
-    assert compiled[0] and compiled[1] == compiled[0] == compiled[2]
+    assert compiled[0] and all(later == compiled[0] for later in compiled)
