@@ -191,7 +191,8 @@ class Model(ContactMethods, Body):
                 model. When it returns true (on all ranks), the run ends with a report.
             dt: time step [s]; by default ``courant`` times the critical one, which is updated as the soil changes.
             courant: alpha_c of (17), in (0, 1].
-            damping: local damping alpha, in [0, 1); it must be 0 with free fields beside the sides.
+            damping: local damping alpha, in [0, 1); it must be 0 with free fields beside the sides, and damps the waves of an
+                earthquake, for which ``rayleigh`` is meant.
             rayleigh: damping of soil at small strains; see `Rayleigh`.
             pic: PIC fraction: the part of the particles' own velocities that the nodal velocities replace in a critical time
                 step, in [0, 1]; 0 is FLIP. A step of dt takes 1 - (1 - pic)^(dt / dt_cr), so that the effect does not depend on
@@ -252,7 +253,7 @@ class Model(ContactMethods, Body):
         run.conversion = checked_conversion(self, conversion, integration)
         require_particles(self)
         require_new_soil_outside(self)
-        warn_of_setup(self, nmd)
+        warn_of_setup(self, nmd, damping)
         if moving_cells:
             warn_of_parts(self)
         reports = run_explicit(self, options, run, times, watch, threshold, steps, limit, damped)

@@ -41,12 +41,12 @@ NEARLY_INCOMPRESSIBLE = 0.45
 """Poisson's ratio above which linear cells lock"""
 
 
-def warn_of_setup(model: Model, nmd: bool) -> None:
-    """Warn of probable mistakes in the input. Collective."""
+def warn_of_setup(model: Model, nmd: bool, damping: float = 0.0) -> None:
+    """Warn of probable mistakes in the input, and of local damping where it does not suit the model. Collective."""
     locks = "" if nmd else locking(model.laws)
     of_loads = _nothing_acts(model), _nothing_holds(model), _upwards(model), _weight(model) or _softness(model)
     of_laws = angles_in_radians(model.laws), _beyond_preconsolidation(model), locks
-    of_sides = *_held_sides(model), *_cut_motion(model), *_reversed_interfaces(model)
+    of_sides = *_held_sides(model), *_cut_motion(model), *_reversed_interfaces(model), _damped_waves(model, damping)
     found = [text for text in (*of_loads, *of_laws, *of_sides) if text]
     if model.comm.rank == 0:
         for text in found:
@@ -97,6 +97,16 @@ def _cut_motion(model: Model) -> Iterator[str]:
                 f"the motion that enters {what} at {abs(end) / largest:.0%} of its largest velocity, and is zero beyond, which is a "
                 "blow: bring its velocity to zero at its ends, as by a baseline correction and a taper"
             )
+
+
+def _damped_waves(model: Model, damping: float) -> str:
+    """Of local damping in a model that waves enter."""
+    if not (damping and model._incoming):
+        return ""
+    return (
+        f"damping is {damping:g} where a motion enters (model.shake, model.drive): local damping weakens its waves at all "
+        "frequencies; give rayleigh=mpm.Rayleigh.of_ratio(0.02, frequencies=(1.0, 5.0)), for instance, in its place"
+    )
 
 
 def _reversed_interfaces(model: Model) -> list[str]:

@@ -116,7 +116,7 @@ def test_soil_that_keeps_its_volume_as_it_fails_is_named_unless_strains_are_aver
     assert len(said) == (dilation_angle == 0 and not nmd)
 
 
-def shaken(hold, motion=((0.0, 1.0, 2.0), (0.0, 1e-3, 0.0)), let_in="shake", direction=(1, 0)):
+def shaken(hold, motion=((0.0, 1.0, 2.0), (0.0, 1e-3, 0.0)), let_in="shake", direction=(1, 0), **options):
     """Warnings of a model whose base, the facets of tag 3, lets a wave in and has further boundary conditions."""
     model = mpm.Model(box([2, 2]), mpm.LinearElastic(young=1e6, poisson=0.3))
     model.seed(density=2000.0, per_cell=3)
@@ -127,7 +127,7 @@ def shaken(hold, motion=((0.0, 1.0, 2.0), (0.0, 1e-3, 0.0)), let_in="shake", dir
         model.absorb(3)
     if let_in == "shake":
         model.shake(mpm.Motion(*motion), direction)
-    return said(model)
+    return said(model, **options)
 
 
 @pytest.mark.parametrize("let_in", ["shake", "drive"])
@@ -156,6 +156,16 @@ def test_a_motion_that_is_cut_off_is_warned_of():
     assert any("ends at 100% of its" in text for text in shaken(free, motion=((0.0, 1.0), (0.0, 1e-3))))
     assert any("begins at 6% of its" in text for text in shaken(free, motion=((0.0, 1.0, 2.0), (-6e-5, 1e-3, 0.0))))
     assert shaken(free, motion=((0.0, 1.0, 2.0), (4e-5, 1e-3, -4e-5))) == []
+
+
+@pytest.mark.parametrize("let_in", ["shake", "drive", None])
+def test_local_damping_where_a_motion_enters_is_warned_of(let_in):
+    free = lambda model: model.set_gravity((0.0, -9.81))  # noqa: E731
+    found = [
+        text for text in shaken(free, let_in=let_in, damping=0.05) if "damping is 0.05 where a motion enters" in text
+    ]
+    assert len(found) == (let_in is not None) and all("rayleigh=" in text for text in found)
+    assert shaken(free, let_in=let_in, rayleigh=mpm.Rayleigh(mass=1.0)) == []
 
 
 @pytest.mark.parametrize(
