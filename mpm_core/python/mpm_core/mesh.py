@@ -47,7 +47,7 @@ def floats(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> NDArr
     if array.ndim != len(shape) or any(e is not None and e != s for e, s in zip(shape, array.shape, strict=True)):
         expected = tuple("n" if e is None else e for e in shape)
         raise InputError(f"{name} has shape {array.shape}, expected {expected}".replace("'", ""))
-    array = np.ascontiguousarray(array, dtype=np.float64)
+    array = np.ascontiguousarray(array, dtype=np.float64).reshape(array.shape)  # it makes a row of a single number
     if not np.isfinite(array).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(f"{name} is {array[where]} at index {where}, expected finite numbers")

@@ -62,8 +62,15 @@ class Rayleigh:
         return cls(2 * ratio * one * other / (one + other), 2 * ratio / (one + other), plastic_strain)
 
     def ratio(self, frequency: ArrayLike) -> NDArray[np.float64]:
-        """Damping ratio at the given frequencies [Hz]; same shape."""
-        omega = 2 * np.pi * np.asarray(frequency, dtype=float)
+        """Damping ratio at the given frequencies [Hz]; same shape.
+
+        Raises:
+            InputError: a frequency that is not positive.
+        """
+        frequencies = floats("frequency", frequency, (None,) * np.ndim(frequency))
+        if not (frequencies > 0).all():
+            raise InputError(f"frequency is {frequencies.min():g} Hz, expected positive numbers")
+        omega = 2 * np.pi * frequencies
         return 0.5 * (self.mass / omega + self.stiffness * omega)
 
     def time_step(self, critical: float) -> float:

@@ -37,7 +37,7 @@ def _require_two_phases(model: Model, integration: Any, stress_update: Any, rayl
         "rigid surfaces": bool(model._contacts),
         "absorbing sides": bool(model._absorbing),
         "retention curves": model._core.water.may_dry,
-        "Rayleigh damping": rayleigh != Rayleigh(),
+        "Rayleigh damping": rayleigh.mass > 0 or rayleigh.stiffness > 0,
         "DUAL_DOMAIN integration": integration == Integration.DUAL_DOMAIN,
         f"stress_update {stress_update}": stress_update != StressUpdate.MODIFIED_LAST,
     }

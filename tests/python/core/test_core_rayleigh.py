@@ -141,3 +141,20 @@ def test_soil_that_has_yielded_is_not_damped():
 def test_bad_input_is_refused(make, message):
     with pytest.raises(mpm.InputError, match=message):
         make()
+
+
+def test_damping_of_zero_is_none():
+    def steps(rayleigh):
+        model = with_mode(shear_bar(), 1, resting=False)
+        report = run(model, 0.1, rayleigh=rayleigh)
+        return report.steps, report.damping_work, model.particles.velocity
+
+    undamped = steps(None)
+    for rayleigh in (mpm.Rayleigh.of_ratio(0.0, (1.0, 5.0)), mpm.Rayleigh(plastic_strain=np.inf)):
+        assert (rayleigh.ratio(1.0), rayleigh.time_step(1e-3)) == (0.0, 1e-3)
+        count, work, velocity = steps(rayleigh)
+        assert (count, work) == (undamped[0], 0.0)
+        np.testing.assert_array_equal(velocity, undamped[2])
+    for wrong in (0.0, [1.0, -1.0], "1"):
+        with pytest.raises(mpm.InputError, match="frequency"):
+            RAYLEIGH.ratio(wrong)
