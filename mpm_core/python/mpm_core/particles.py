@@ -126,8 +126,9 @@ class Particles:
         """The particles of this rank as a table of pandas, by their numbers.
 
         Args:
-            names: fields, one column for each component: ``position_x``, ``stress_xx``; without any, position, displacement,
-                velocity, stress and plastic strain.
+            names: fields, one column for each component: ``position_x``, ``stress_xx``, in axial symmetry ``stress_hoop`` in the
+                place of ``stress_zz``, ``velocity_gradient_xy`` for dv_x/dy; without any, position, displacement, velocity,
+                stress and plastic strain.
 
         Returns:
             pandas.DataFrame; its ``attrs["units"]`` has the unit of each column.
@@ -145,7 +146,8 @@ class Particles:
         """The particles of this rank as points of a meshio.Mesh with fields, which ``pyvista.from_meshio`` takes as well.
 
         Args:
-            names: fields, as for `to_dataframe`.
+            names: fields, as for `to_dataframe`. Vectors have three components; tensors are one field for each component, with
+                the names of `to_dataframe`, as in the files of `ParticleOutput`.
 
         Raises:
             AttributeError: a field that does not exist.

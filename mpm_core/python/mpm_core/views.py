@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 _AXES = {2: ("x", "y"), 3: ("x", "y", "z")}
 _TENSORS = {4: ("xx", "yy", "zz", "xy"), 6: ("xx", "yy", "zz", "xy", "yz", "xz")}
+_TENSOR_OF_SECTION = ("xx", "yy", "hoop", "xy")
+"""Components in axial symmetry, where x is the radius, as files name them"""
 _KINDS = {2: "triangles", 3: "tetrahedra"}
 
 
@@ -74,13 +76,25 @@ def report_text(report: Report) -> str:
     )
 
 
-def _columns(name: str, values: np.ndarray, dim: int) -> dict[str, np.ndarray]:
+def _columns(particles: Particles, name: str) -> dict[str, np.ndarray]:
     """A field as columns with one number per particle."""
+    values = np.asarray(getattr(particles, name))
     if values.ndim == 1:
         return {name: values}
-    width = values.shape[1]
-    ends = _AXES[dim] if width == dim else _TENSORS.get(width, tuple(map(str, range(width))))
+    ends = _components(name, values.shape[1], particles.position.shape[1], particles._geometry)
     return {f"{name}_{end}": values[:, k] for k, end in enumerate(ends)}
+
+
+def _components(name: str, width: int, dim: int, geometry: Geometry) -> Sequence[str]:
+    """Names of the components of a field with several."""
+    axes = _AXES[dim]
+    if width == dim:
+        return axes
+    if name.endswith("_gradient") and width == dim**2:
+        return [f"{of}{along}" for of in axes for along in axes]
+    if geometry == Geometry.AXISYMMETRIC and width == len(_TENSOR_OF_SECTION):
+        return _TENSOR_OF_SECTION
+    return _TENSORS.get(width, [str(k) for k in range(width)])
 
 
 def _units(particles: Particles) -> dict[str, str]:
@@ -95,9 +109,9 @@ def particle_table(particles: Particles, names: Sequence[str]) -> Any:
     import pandas
 
     units = _units(particles)
-    dim, columns, unit_of = particles.position.shape[1], {}, {}
+    columns, unit_of = {}, {}
     for name in names:
-        for column, values in _columns(name, getattr(particles, name), dim).items():
+        for column, values in _columns(particles, name).items():
             columns[column], unit_of[column] = values, units[name]
     frame = pandas.DataFrame(columns, index=pandas.Index(particles.id, name="id"))
     frame.attrs["units"] = unit_of
@@ -108,11 +122,20 @@ def particle_mesh(particles: Particles, names: Sequence[str]) -> Any:
     """See `Particles.to_meshio`."""
     import meshio
 
-    position = particles.position
-    points = np.zeros((len(position), 3))
-    points[:, : position.shape[1]] = position
-    cells = [("vertex", np.arange(len(points))[:, None])]
-    return meshio.Mesh(points, cells, point_data={name: np.array(getattr(particles, name)) for name in names})
+    dim, fields = particles.position.shape[1], {}
+    for name in names:
+        values = np.array(getattr(particles, name))
+        if values.shape[1:] == (dim,):
+            fields[name] = _in_space(values)
+        else:
+            fields |= _columns(particles, name)
+    cells = [("vertex", np.arange(len(particles))[:, None])]
+    return meshio.Mesh(_in_space(particles.position), cells, point_data=fields)
+
+
+def _in_space(vectors: np.ndarray) -> np.ndarray:
+    """Vectors with three components."""
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
 
 
 def _plotted(particles: Particles, name: str) -> tuple[np.ndarray, str]:
@@ -123,7 +146,7 @@ def _plotted(particles: Particles, name: str) -> tuple[np.ndarray, str]:
         if name != field and not name.startswith(f"{field}_"):
             continue
         values = np.asarray(getattr(particles, field))
-        columns = _columns(field, values, dim)
+        columns = _columns(particles, field)
         if name not in columns and name == field and values.ndim == 2 and values.shape[1] == dim:
             columns = {name: np.linalg.norm(values, axis=1)}
         if name not in columns:

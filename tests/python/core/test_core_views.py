@@ -77,6 +77,23 @@ def test_meshio_has_particles_as_points_with_fields(model, tmp_path):
     assert len(read.cells_dict["vertex"]) == len(p)
 
 
+def test_components_of_tensors_have_their_names(model, tmp_path):
+    # v = (x, y) -> (3 y, 5 x) has the gradient dv_x/dy = 3, dv_y/dx = 5, rows by component and columns by axis.
+    p = model.particles
+    p.set("velocity_gradient", np.tile([0.0, 3.0, 5.0, 0.0], (len(p), 1)))
+    table = p.to_dataframe("velocity_gradient")
+    assert table.iloc[0].to_dict() == {
+        "velocity_gradient_xx": 0.0, "velocity_gradient_xy": 3.0, "velocity_gradient_yx": 5.0, "velocity_gradient_yy": 0.0
+    }  # fmt: skip
+    revolved = mpm.Model(box((2, 2)), model.laws[0], geometry=mpm.Geometry.AXISYMMETRIC)
+    revolved.seed(density=1.0, per_cell=3)
+    stresses = ["stress_xx", "stress_yy", "stress_hoop", "stress_xy"]
+    assert list(revolved.particles.to_dataframe("stress")) == stresses
+    fields = revolved.particles.to_meshio("stress", "velocity", "volume").point_data
+    assert list(fields) == [*stresses, "velocity", "volume"]
+    assert fields["velocity"].shape == (len(revolved.particles), 3)  # a vector, also for ParaView
+
+
 def test_a_picture_has_a_circle_as_large_as_each_particle_coloured_by_the_field(model):
     p = model.particles
     axes = p.plot("displacement")
