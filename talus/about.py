@@ -17,12 +17,16 @@ OTHERS = ("h5py", "gmsh", "matplotlib", "jinja2", "tqdm")
 """Modules that files, meshes, pictures, pages and progress bars need"""
 
 
+def version() -> str:
+    """Version of Talus, or the reason why its core cannot be loaded."""
+    return str(_versions().version_of("mpm_core"))
+
+
 def about() -> str:
     """Versions, solvers and processors as lines of text."""
     from ctypes.util import find_library  # which takes a third of the other imports of `talus`
 
-    sys.path.insert(0, str(find.SHIPPED))
-    common = importlib.import_module("common.versions")
+    common = _versions()
     lines = {
         **{name.replace("_", " "): version for name, version in common.versions().items()},
         **{name: common.version_of(name) for name in OTHERS},
@@ -34,6 +38,12 @@ def about() -> str:
         "studies": ", ".join(str(folder) for folder in find.folders()),
     }  # fmt: skip
     return "\n".join(f"{name + ':':<16} {value}" for name, value in lines.items())
+
+
+def _versions() -> Any:
+    """The module of studies that finds versions."""
+    sys.path.insert(0, str(find.SHIPPED))
+    return importlib.import_module("common.versions")
 
 
 def _solvers(petsc: Any) -> str:

@@ -9,9 +9,10 @@ import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 from talus import find
-from talus.about import about
+from talus.about import about, version
 from talus.begin import begin
 from talus.completion import SCRIPTS
 from talus.launch import run
@@ -20,9 +21,18 @@ NEEDED = ("dolfinx", "h5py", "matplotlib", "PIL", "tqdm", "jinja2", "scipy")
 """Modules without which a study ends while it is imported"""
 
 
+class _Version(argparse.Action):
+    """Prints the version, which the core is asked for only then."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        print(f"talus {version()}")
+        parser.exit()
+
+
 def parser() -> argparse.ArgumentParser:
     """Parser of all commands."""
     p = argparse.ArgumentParser(prog="talus", description="Slopes from rest to large deformation, by FEM and MPM.")
+    p.add_argument("--version", action=_Version, nargs=0, help="print the version and end")
     commands = p.add_subparsers(dest="command", required=True, metavar="COMMAND")
     commands.add_parser("run", help="run a study; see `talus run --help`")  # `run_study` takes its arguments
     commands.add_parser("list", help="list all studies, including your own")

@@ -5,7 +5,7 @@ _talus() {
   local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command=${COMP_WORDS[1]} study=${COMP_WORDS[2]}
   [[ $study != --ranks ]] || study=${COMP_WORDS[4]}
   if ((COMP_CWORD == 1)); then
-    COMPREPLY=($(compgen -W "run list new info completion" -- "$word"))
+    COMPREPLY=($(compgen -W "run list new info completion --version" -- "$word"))
   elif [[ $command == completion ]]; then
     COMPREPLY=($(compgen -W "bash zsh fish" -- "$word"))
   elif [[ $command == run && ($before == run || ${COMP_WORDS[COMP_CWORD-2]} == --ranks) ]]; then
@@ -33,6 +33,7 @@ function _talus_options
   set -q words[$place]; and talus run $words[$place] --help 2>/dev/null | string match -ra -- '--[a-z0-9-]+'
 end
 complete -c talus -f -n __fish_use_subcommand -a "run list new info completion"
+complete -c talus -f -n __fish_use_subcommand -l version -d "print the version"
 complete -c talus -f -n "__fish_seen_subcommand_from list new info"
 complete -c talus -f -n "__fish_seen_subcommand_from completion" -a "bash zsh fish"
 complete -c talus -x -n "__fish_seen_subcommand_from run" -l ranks -d "number of ranks"

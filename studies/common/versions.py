@@ -1,4 +1,4 @@
-"""Versions of the program and its libraries. A library is imported when its version is asked for, since it may be missing."""
+"""Versions of Talus and its libraries. A library is imported when its version is asked for, since it may be missing."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from .files import IN_SOURCES, ROOT
 
 SOURCES: dict[str, tuple[str, Callable[[Any], str]]] = {
-    "program": ("mpm_core", lambda module: module.__version__),
+    "talus": ("mpm_core", lambda module: module.__version__),
     "compiler": ("mpm_core", lambda module: f"GCC or compatible {module.compiler}"),
     "numpy": ("numpy", lambda module: module.__version__),
     "mpi": ("mpi4py.MPI", lambda module: module.Get_library_version().split(",")[0].strip()),

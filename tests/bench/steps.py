@@ -153,7 +153,7 @@ def machine() -> dict:
         "cores": os.cpu_count(),
         "system": platform.platform(),
         "compiler": mpm.compiler,
-        "program": mpm.__version__,
+        "talus": mpm.__version__,
     }
 
 

@@ -127,8 +127,13 @@ def test_ctrl_c_reaches_all_ranks(begun):
 
 def test_info_names_versions_and_solvers(tmp_path):
     lines = dict(line.split(":", 1) for line in talus(tmp_path, "info").stdout.splitlines())
-    assert lines["program"].strip() == mpm_core.__version__
+    assert lines["talus"].strip() == mpm_core.__version__
     assert {"dolfinx", "petsc", "gmsh", "linear solvers", "processors", "studies"} <= set(lines)
+
+
+def test_version_is_that_of_the_core(tmp_path):
+    done = talus(tmp_path, "--version")
+    assert (done.returncode, done.stdout) == (0, f"talus {mpm_core.__version__}\n")
 
 
 def test_info_names_what_is_missing_or_cannot_be_loaded(tmp_path):
@@ -138,7 +143,7 @@ def test_info_names_what_is_missing_or_cannot_be_loaded(tmp_path):
         (tmp_path / f"{name}.py").write_text(f"raise {error}")
     done = talus(tmp_path, "info", PYTHONPATH=os.pathsep.join([str(tmp_path), ENVIRONMENT["PYTHONPATH"]]))
     lines = {name: text.strip() for name, text in (line.split(":", 1) for line in done.stdout.splitlines())}
-    assert done.returncode == 0 and lines["program"] == mpm_core.__version__
+    assert done.returncode == 0 and lines["talus"] == mpm_core.__version__
     assert lines["dolfinx"] == "not found" and lines["matplotlib"] == "not loaded: libfree"
     assert lines["h5py"] == "not loaded: no numpy.core"
 

@@ -85,7 +85,7 @@ def test_summary_holds_parameters_versions_and_results(tmp_path):
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["parameters"] == {"height": 1.0, "output": "somewhere"}
     assert summary["crest_displacement_m"] == 0.42 and summary["counts"]["cells"] == 640 and summary["ranks"] == 1
-    assert set(versions()) == set(summary["versions"]) >= {"program", "dolfinx", "petsc", "compiler", "git_revision"}
+    assert set(versions()) == set(summary["versions"]) >= {"talus", "dolfinx", "petsc", "compiler", "git_revision"}
     assert [path.name for path in tmp_path.iterdir()] == ["summary.json"]
 
 

@@ -67,7 +67,7 @@ def test_a_short_run_writes_all_it_promises(tmp_path):
     assert summary["finished_run"] and summary["time_s"] == 0.5
     # FEM and particles share the cells, so the particles start in equilibrium.
     assert summary["initial_out_of_balance_ratio"] < 1e-9
-    assert {"program", "dolfinx", "petsc", "compiler", "git_revision"} <= set(summary["versions"])
+    assert {"talus", "dolfinx", "petsc", "compiler", "git_revision"} <= set(summary["versions"])
     assert summary["parameters"]["unit_weight"] == 80e3 and summary["particle_steps_per_second"] > 0
     assert len(history(tmp_path)["time_s"]) == 4
 
