@@ -34,10 +34,10 @@ def slope_mesh(
     comm: MPI.Comm,
     height: float = 1.0,
     angle: float = 45.0,
-    crest: float = 1.1,
+    crest: float | None = None,
     cell_size: float = 0.1,
     kind: str = "crossed",
-    runout: float = 2.0,
+    runout: float | None = None,
     headroom: float | None = None,
     depth: float = 0.0,
 ) -> tuple[Mesh, MeshTags, MeshTags]:
@@ -51,11 +51,11 @@ def slope_mesh(
         comm: the ranks that share the mesh.
         height: height of the slope [m].
         angle: angle of the slope to the horizontal [degrees], above 0 and up to 90.
-        crest: length of the level ground behind the slope [m].
+        crest: length of the level ground behind the slope [m]; None for 1.1 times the height, with "crossed" the next whole cells.
         cell_size: edge of the squares, or of the triangles of an unstructured mesh [m].
         kind: "crossed", squares cut in four by their diagonals (angle 45 or 90; height and crest whole cells); "fitted", the same
             with the squares stretched to fit any slope; "gmsh", unstructured.
-        runout: length of the background past the toe [m]. All kinds but "gmsh" round it up to whole cells.
+        runout: length of the background past the toe [m]; None for twice the height. All kinds but "gmsh" round it up to whole cells.
         headroom: height of the background above the crest [m], rounded like `runout`; None for one cell.
         depth: of the soil below the toe [m], rounded like `runout`; none with "gmsh".
 
@@ -66,10 +66,10 @@ def slope_mesh(
     Raises:
         InputError: dimensions that are out of range or do not fit, or another kind. Raised on all ranks alike.
     """
-    headroom = cell_size if headroom is None else headroom
 
     def arrays() -> Any:
-        shape = _checked(height, angle, crest, cell_size, runout, headroom, depth)
+        lengths = _lengths(height, cell_size, kind, crest, runout, headroom)
+        shape = _checked(height, angle, lengths[0], cell_size, *lengths[1:], depth)
         makers = {"crossed": _crossed, "fitted": _fitted, "gmsh": _unstructured}
         if kind not in makers:
             raise InputError(f"kind is {kind!r}, expected one of {', '.join(makers)}")
@@ -78,6 +78,20 @@ def slope_mesh(
     result = on_first_rank(comm, arrays)
     domain, cell_tags, facet_tags = distributed_mesh(comm, result if result is not None else empty_arrays(2), 2)
     return domain, name_tags(cell_tags, _NAMES[0]), name_tags(facet_tags, _NAMES[1])
+
+
+def _lengths(
+    height: float, cell_size: float, kind: str, crest: float | None, runout: float | None, headroom: float | None
+) -> tuple[float, float, float]:
+    """Crest, runout and headroom [m], those that are None by the height and the cells."""
+    for name, value in (("height", height), ("cell_size", cell_size)):
+        if not (is_finite(value) and value > 0):
+            raise InputError(f"{name} is {value!r} m, expected a positive length")
+    if crest is None:
+        crest = 1.1 * height
+        if kind == "crossed":
+            crest = cell_size * math.ceil(crest / cell_size - 1e-9)
+    return crest, 2.0 * height if runout is None else runout, cell_size if headroom is None else headroom
 
 
 def _checked(
@@ -89,7 +103,7 @@ def _checked(
     headroom: Any,
     depth: Any,
 ) -> tuple[Any, ...]:
-    for name, value in (("height", height), ("crest", crest), ("cell_size", cell_size), ("runout", runout)):
+    for name, value in (("crest", crest), ("runout", runout)):
         if not (is_finite(value) and value > 0):
             raise InputError(f"{name} is {value!r} m, expected a positive length")
     if not (is_finite(headroom) and headroom >= 0):

@@ -113,6 +113,23 @@ def test_slope_that_does_not_fit_is_refused(options, words):
         bridge.slope_mesh(COMM, **options)
 
 
+@pytest.mark.parametrize(
+    "options, crest",
+    [
+        ({"kind": "crossed", "cell_size": 2.0}, 12.0),  # 11 m, rounded up to whole cells
+        ({"kind": "crossed", "cell_size": 1.0}, 11.0),
+        ({"kind": "fitted", "cell_size": 2.0, "angle": 30.0}, 11.0),
+        ({"kind": "gmsh", "cell_size": 2.0, "angle": 90.0}, 11.0),
+    ],
+)
+def test_lengths_that_are_not_given_follow_the_height(options, crest):
+    arrays = bridge.background_arrays(*bridge.slope_mesh(COMM, height=10.0, **options))
+    top = arrays["points"][arrays["facets"][arrays["facet_tags"] == bridge.CREST]]
+    assert top[..., 0].max() == pytest.approx(crest)
+    slope = 10.0 / np.tan(np.radians(options.get("angle", 45.0)))
+    assert arrays["points"][:, 0].max() == pytest.approx(crest + slope + 20.0)
+
+
 def test_geo_file_gives_the_same_slope_and_takes_parameters():
     slope = bridge.read_mesh(MESHES / "slope.geo", COMM)
     assert soil_cells(slope) == soil_cells(bridge.slope_mesh(COMM, kind="gmsh"))
