@@ -5,11 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from mpm_core import checks
+from mpm_core.collective import collectively
+from numpy.typing import NDArray
 
 from mpm_core import InputError
 
-__all__ = ["InputError", "agree", "is_finite"]
+__all__ = ["InputError", "agree", "is_finite", "real_numbers", "require_mesh"]
 
 
 def agree(comm: MPI.Comm, message: str | None) -> None:
@@ -32,3 +36,31 @@ def agree(comm: MPI.Comm, message: str | None) -> None:
 def is_finite(value: Any) -> bool:
     """Whether a value is a number, and a finite one."""
     return isinstance(value, (int, float, np.number)) and bool(np.isfinite(value))
+
+
+def real_numbers(comm: MPI.Comm, name: str, values: Any) -> NDArray[np.float64]:
+    """Real numbers of any shape, float64. Collective.
+
+    Args:
+        comm: the ranks.
+        name: of the argument, for the error.
+        values: numbers or arrays of them.
+
+    Raises:
+        InputError: text, complex numbers or other things on any rank. Raised on all ranks alike.
+    """
+    return collectively(comm, lambda: checks.real_numbers(name, values))
+
+
+def require_mesh(domain: Any) -> None:
+    """Require that an argument is a mesh, before its communicator is used. Not collective.
+
+    Raises:
+        InputError: it is something else, such as a mesh together with its tags.
+    """
+    if isinstance(domain, Mesh):
+        return
+    whole = isinstance(domain, (tuple, list)) and len(domain) > 0 and isinstance(domain[0], Mesh)
+    hint = ", the first of these: domain, cell_tags, facet_tags = ..." if whole else ""
+    shown = f"a {type(domain).__name__} of {len(domain)} things" if whole else repr(domain)
+    raise InputError(f"domain is {shown}, expected a mesh of DOLFINx{hint}")

@@ -20,7 +20,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree
+from fenics_bridge.errors import agree, real_numbers
 from fenics_bridge.fem.fields import assembled
 from fenics_bridge.fem.geometry import weighted
 from fenics_bridge.fem.loads import LoadVectors, pressing
@@ -76,7 +76,7 @@ def given_stress(model: Any, stress: Any, new: Any) -> NDArray[np.float64] | Non
     """Initial stress of the new points: (k, S) [Pa]; None for none."""
     if stress is None:
         return None
-    given = np.asarray(stress(model.points.coordinates()[new]), dtype=float)
+    given = real_numbers(model.domain.comm, "stress", stress(model.points.coordinates()[new]))
     expected = int(new.sum()), model.points.size
     good = given.shape == expected and np.all(np.isfinite(given))
     agree(model.domain.comm, None if good else f"stress has shape {given.shape}, expected finite {expected}")
@@ -132,7 +132,7 @@ def _nodal_pressure(domain: Mesh, pore_pressure: Any) -> Any:
 
 def pressures_at(comm: MPI.Comm, pore_pressure: OfPosition, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Pore pressures (n,) [Pa] at positions (n, D) [m]; raises InputError, on all ranks, for other values. Collective."""
-    given = np.asarray(pore_pressure(x), dtype=float)
+    given = real_numbers(comm, "pore_pressure", pore_pressure(x))
     good = given.shape in ((), (len(x),))
     agree(comm, None if good else f"pore_pressure gives values of shape {given.shape}, expected ({len(x)},)")
     agree(comm, None if np.all(np.isfinite(given)) else "pore_pressure gives values that are not finite")

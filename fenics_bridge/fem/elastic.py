@@ -12,7 +12,7 @@ from dolfinx.mesh import Mesh
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree, is_finite
+from fenics_bridge.errors import agree, is_finite, require_mesh
 from fenics_bridge.fem.evaluate import evaluate_at
 from fenics_bridge.fem.fields import (
     assembled,
@@ -131,6 +131,7 @@ def solve_elastic(
             alike.
         RuntimeError: the linear solver failed.
     """
+    require_mesh(domain)
     agree(domain.comm, _first_mistake(young, poisson, unit_weight, degree))
     geometry = geometry_of(domain, geometry)
     radius = radius_of(domain, geometry)
@@ -186,6 +187,7 @@ def solve_nearly_incompressible(
         InputError: as for `solve_elastic`. Raised on all ranks alike.
         RuntimeError: the linear solver failed.
     """
+    require_mesh(domain)
     agree(domain.comm, _first_mistake(young, poisson, unit_weight, 2))
     agree(domain.comm, None if poisson > 0 else f"poisson is {poisson!r}, expected more than 0")
     geometry = geometry_of(domain, geometry)

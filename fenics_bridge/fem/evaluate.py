@@ -9,7 +9,7 @@ from mpm_core.rows import exchange_rows
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree
+from fenics_bridge.errors import agree, real_numbers, require_mesh
 from fenics_bridge.mesh.tagged import owned_cells
 
 _TOLERANCE = 1e-9
@@ -31,9 +31,10 @@ class PointSearch:
     """
 
     def __init__(self, domain: Mesh, points: ArrayLike, active: fem.Function | None = None) -> None:
+        require_mesh(domain)
         self._domain = domain  # it owns the communicator
         self._comm, dim = domain.comm, domain.geometry.dim
-        points = np.ascontiguousarray(points, dtype=float)
+        points = real_numbers(self._comm, "points", points)
         good = points.ndim == 2 and points.shape[1] == dim and np.all(np.isfinite(points))
         agree(self._comm, None if good else f"points has shape {points.shape}, expected finite (n, {dim})")
         self.points = points

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from mpm_core.checks import real_numbers
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.errors import InputError
@@ -82,7 +83,7 @@ def k0_layered_stress(
     Raises:
         InputError: points, surface or layers of another shape, layers in another order, or values out of range.
     """
-    points = np.asarray(points, dtype=float)
+    points = real_numbers("points", points)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise InputError(f"points has shape {points.shape}, expected (n, 2) or (n, 3)")
     bottoms, unit_weights, ratios = _checked_layers(layers)
@@ -98,7 +99,7 @@ def k0_layered_stress(
 
 
 def _checked_layers(layers: Any) -> Any:
-    table = np.asarray(layers, dtype=float)
+    table = real_numbers("layers", layers)
     if table.ndim != 2 or table.shape[1] != 3 or len(table) == 0 or np.isnan(table).any():
         raise InputError(f"layers is {layers!r}, expected rows of (bottom, unit_weight, k0)")
     bottoms, unit_weights, ratios = table.T
@@ -115,8 +116,8 @@ def surface_height(surface: Surface, points: NDArray[np.float64]) -> NDArray[np.
     """Height of the ground above each point: (n,) [m]; `surface` as in `k0_stress`."""
     if callable(surface):
         height = surface(points[:, 0] if points.shape[1] == 2 else points[:, :-1])
-        return np.broadcast_to(np.asarray(height, dtype=float), (len(points),))
-    line = np.asarray(surface, dtype=float)
+        return np.broadcast_to(real_numbers("surface", height), (len(points),))
+    line = real_numbers("surface", surface)
     if line.ndim == 0:
         return np.full(len(points), float(line))
     if line.ndim != 2 or line.shape[1] != 2 or np.any(np.diff(line[:, 0]) < 0):

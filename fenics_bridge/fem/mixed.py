@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import mpm_core as mpm
 from fenics_bridge import compat
-from fenics_bridge.errors import agree
+from fenics_bridge.errors import agree, require_mesh
 from fenics_bridge.fem.equilibration import EquilibriumReport, find_equilibrium
 from fenics_bridge.fem.equilibrium import Body
 from fenics_bridge.fem.evaluate import evaluate_at
@@ -63,6 +63,7 @@ class MixedQuasiStatic(SupportedBody):
         solver: Solver | None = None,
         geometry: Geometry | None = None,
     ) -> None:
+        require_mesh(domain)
         agree(domain.comm, _first_mistake(law))
         self.geometry = geometry_of(domain, geometry)
         """Plane strain, axial symmetry or a solid"""

@@ -13,7 +13,7 @@ from mpm_core.parameter_fields import Field
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree
+from fenics_bridge.errors import agree, require_mesh
 from fenics_bridge.fem.active_cells import reconfigure, water_on_supports
 from fenics_bridge.fem.averaged import AveragedKinematics
 from fenics_bridge.fem.equilibration import EquilibriumReport, find_equilibrium
@@ -78,6 +78,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         geometry: Geometry | None = None,
         as_particles: bool = False,
     ) -> None:
+        require_mesh(domain)
         self.geometry = geometry_of(domain, geometry)
         """Plane strain, axial symmetry or a solid"""
         self.radius = radius_of(domain, self.geometry)

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import InputError, agree, is_finite
+from fenics_bridge.errors import agree, is_finite, require_mesh, InputError
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.mesh.tagged import require_tags_of
 from fenics_bridge.types import MeshTags
@@ -213,6 +213,7 @@ def flat_normal(domain: Mesh, facet_tags: MeshTags, tag: int | str) -> tuple[flo
     Raises:
         InputError: no facet has the tag. Raised on all ranks alike.
     """
+    require_mesh(domain)
     facets = tagged_facets(domain.comm, facet_tags, tag, "facet_tag")
     corners = domain.geometry.x[compat.facet_nodes(domain, facets)][:, :, : domain.geometry.dim]
     size = np.ptp(domain.geometry.x, axis=0).max() if len(domain.geometry.x) else 0.0

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 import mpm_core as mpm
 from fenics_bridge import compat
+from fenics_bridge.errors import require_mesh
 from fenics_bridge.mesh.names import names_of
 from fenics_bridge.mesh.tagged import owned_cells, require_tags_of, tag_values
 from fenics_bridge.types import MeshTags
@@ -36,6 +37,7 @@ def background_arrays(
     Raises:
         InputError: tags of other entities, or of another mesh. Raised on all ranks alike.
     """
+    require_mesh(domain)
     dim = domain.topology.dim
     require_tags_of(domain, facet_tags, dim - 1)
     nodes = domain.geometry.index_map()
@@ -85,6 +87,7 @@ def original_cells(domain: Mesh) -> NDArray[np.int64]:
     Returns:
         Shape (m,), by the local number of the cell.
     """
+    require_mesh(domain)
     return np.array(domain.topology.original_cell_index[: owned_cells(domain)], dtype=np.int64)
 
 

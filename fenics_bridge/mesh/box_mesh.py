@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from mpm_core.checks import real_numbers
 from mpm_core.collective import on_first_rank
 from numpy.typing import ArrayLike, NDArray
 
@@ -50,7 +51,7 @@ def box_mesh(
 
 
 def _arrays(lengths: Any, counts: Any, diagonals: str, body: Any) -> Any:
-    lengths, counts = np.asarray(lengths, dtype=float), np.asarray(counts)
+    lengths, counts = real_numbers("lengths", lengths), np.asarray(counts)
     dim = len(lengths)
     if dim not in (2, 3) or not (np.isfinite(lengths).all() and (lengths > 0).all()):
         raise InputError(f"lengths is {lengths.tolist()} m, expected two or three positive lengths")
@@ -61,7 +62,7 @@ def _arrays(lengths: Any, counts: Any, diagonals: str, body: Any) -> Any:
     grid = np.indices(counts + 1).reshape(dim, -1).T
     points, cells = grid * (lengths / counts), _simplices(counts, diagonals == "alternating")
     centres = points[cells].mean(axis=1)
-    low, high = np.asarray([[-np.inf] * dim, [np.inf] * dim] if body is None else body, dtype=float)
+    low, high = real_numbers("body", [[-np.inf] * dim, [np.inf] * dim] if body is None else body)
     inside = ((centres > low) & (centres < high)).all(axis=1)
     return MeshArrays(points, cells, np.where(inside, BODY, 0).astype(np.int32), *_sides(grid, cells, counts))
 

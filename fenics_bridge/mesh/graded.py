@@ -9,7 +9,7 @@ from dolfinx import mesh
 from mpi4py import MPI
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree
+from fenics_bridge.errors import agree, real_numbers, require_mesh
 from fenics_bridge.mesh.names import label, name_tags, names_of, tag_numbers
 from fenics_bridge.mesh.tagged import tag_values
 from fenics_bridge.types import MeshTags, OfPosition
@@ -44,13 +44,15 @@ def graded_tags(
         >>> tags, depths = bridge.graded_tags(domain, cell_tags, "clay", lambda x: 3.0 - x[:, 1])
         >>> laws = {tag: mpm.tresca(young=5e6, poisson=0.49, shear_strength=12e3 + 1.5e3 * z) for tag, z in depths.items()}
     """
+    require_mesh(domain)
     comm, dim = domain.comm, domain.topology.dim
     old = tag_numbers(comm, cell_tags, soil, "soil", "cell")
     agree(comm, None if classes >= 1 else f"classes is {classes!r}, expected a whole number from 1 on")
     tags = tag_values(domain, cell_tags, dim)
     corners = domain.geometry.x[compat.cell_nodes(domain), : domain.geometry.dim]
     rows = np.flatnonzero(np.isin(tags, old))
-    values = np.broadcast_to(np.asarray(value_of(corners[rows].mean(axis=1)), dtype=float), len(rows))
+    given = real_numbers(comm, "value_of", value_of(corners[rows].mean(axis=1)))
+    values = np.broadcast_to(given, len(rows))
     agree(comm, None if np.all(np.isfinite(values)) else "value_of gives values that are not finite")
     low, high = comm.allreduce(values.min(initial=np.inf), MPI.MIN), comm.allreduce(
         values.max(initial=-np.inf), MPI.MAX

@@ -10,6 +10,7 @@ from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
 from fenics_bridge import compat
+from fenics_bridge.errors import require_mesh
 from fenics_bridge.mesh.names import name_tags, names_of, tag_numbers
 from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, owned_cells, require_tags_of, tag_values
 from fenics_bridge.types import MeshTags
@@ -37,6 +38,7 @@ def soil_mesh(
     Raises:
         InputError: no cell has a tag, or tags of other entities or of another mesh. Raised on all ranks alike.
     """
+    require_mesh(domain)
     dim = domain.topology.dim
     require_tags_of(domain, cell_tags, dim)
     require_tags_of(domain, facet_tags, dim - 1)

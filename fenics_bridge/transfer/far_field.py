@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import mpm_core as mpm
 from fenics_bridge import compat
-from fenics_bridge.errors import agree, is_finite
+from fenics_bridge.errors import agree, is_finite, require_mesh
 from fenics_bridge.fem.fields import assembled, elastic_stress, strain
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held, require_same_geometry, weighted
 from fenics_bridge.fem.linear_solver import LinearSolver
@@ -83,6 +83,7 @@ class FarField:
         geometry: mpm.Geometry | None = None,
         options_prefix: str = "far_field_",
     ) -> None:
+        require_mesh(domain)
         agree(domain.comm, _first_mistake(young, poisson, density, degree, supports))
         self._domain = domain
         self.geometry = geometry_of(domain, geometry)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mpm_core as mpm
-from fenics_bridge.errors import InputError, agree
+from fenics_bridge.errors import agree, real_numbers, InputError
 from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport
 from fenics_bridge.fem.supports import Support
 from fenics_bridge.transfer.particle_forces import boundary_forces, seepage_forces
@@ -143,7 +143,8 @@ class ParticleSite:
         self._seeded.append((first, model._next_id, tag))
         if stage.stress is not None:
             stress, rows = model.particles.stress.copy(), self.rows_of(tag) & (model.particles.id >= first)
-            given, expected = np.asarray(stage.stress(model.particles.position[rows]), dtype=float), stress[rows].shape
+            given = real_numbers(model.comm, "stress", stage.stress(model.particles.position[rows]))
+            expected = stress[rows].shape
             good = given.shape == expected and np.all(np.isfinite(given))
             agree(model.comm, None if good else f"stress has shape {given.shape}, expected finite {expected}")
             stress[rows] = given

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
+from mpm_core.checks import real_numbers
 from numpy.typing import NDArray
 
-from fenics_bridge.errors import agree, is_finite
+from fenics_bridge.errors import InputError, agree, is_finite
 
 Value = float | Callable | tuple | NDArray[np.float64]
 
@@ -122,8 +123,8 @@ def mistake_in(condition: WaterBoundary) -> str | None:
         if callable(value):
             continue
         try:
-            numbers = np.asarray(value, dtype=float)
-        except (TypeError, ValueError):
+            numbers = real_numbers(name, value)
+        except InputError:
             return f"{name} is {value!r}, expected a number, a function of time or a table ((time, value), ...)"
         if not np.all(np.isfinite(numbers)):
             return f"{name} is {value!r}, expected finite numbers"

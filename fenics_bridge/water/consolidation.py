@@ -13,7 +13,7 @@ from mpm_core.water_checks import LABORATORY_GRAVITY
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree, is_finite
+from fenics_bridge.errors import agree, is_finite, require_mesh
 from fenics_bridge.fem.active_cells import cells_there
 from fenics_bridge.fem.averaged import AveragedKinematics
 from fenics_bridge.fem.equilibrium import Body
@@ -106,6 +106,7 @@ class Consolidation(ConsolidationResults):
         inertia: Newmark | None = None,
         gravity: float = LABORATORY_GRAVITY,
     ) -> None:
+        require_mesh(domain)
         agree(domain.comm, _first_mistake(element, nmd, soil, geometry, inertia))
         self.water = given_water(domain.comm, unit_weight, gravity, water_modulus, infinite=True)
         """Unit weight and modulus of the water, and the gravity of the model"""

@@ -11,7 +11,7 @@ from dolfinx import fem
 from numpy.typing import NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree, is_finite
+from fenics_bridge.errors import agree, is_finite, real_numbers
 from fenics_bridge.fem.active_cells import cells_there, given_stress, lonely_nodes, take_over
 from fenics_bridge.fem.fields import dilation
 from fenics_bridge.fem.supports import Constraints
@@ -90,7 +90,8 @@ def _place(model: Any, there: Any, was_there: NDArray[np.bool_]) -> None:
 def _pressures(model: Any, pore_pressure: Any) -> NDArray[np.float64]:
     """Pressures [Pa] at all nodes with which new ones come: (m,)."""
     x = model._pressures[0].tabulate_dof_coordinates()[:, : model.domain.geometry.dim]
-    given = np.zeros(len(x)) if pore_pressure is None else np.asarray(pore_pressure(x), dtype=float)
+    values = np.zeros(len(x)) if pore_pressure is None else pore_pressure(x)
+    given = real_numbers(model.domain.comm, "pore_pressure", values)
     good = given.shape == (len(x),) and np.all(np.isfinite(given))
     agree(model.domain.comm, None if good else f"pore_pressure has shape {given.shape}, expected finite {(len(x),)}")
     return given

@@ -9,7 +9,7 @@ import numpy as np
 from dolfinx import fem
 from numpy.typing import ArrayLike, NDArray
 
-from fenics_bridge.errors import InputError, agree, is_finite
+from fenics_bridge.errors import agree, is_finite, real_numbers, InputError
 from fenics_bridge.types import OfPosition
 
 
@@ -81,7 +81,8 @@ class Motion:
         """
         dim = self._space.mesh.geometry.dim
         x = self._space.tabulate_dof_coordinates()[:, :dim]
-        values = np.asarray(velocity(x) if callable(velocity) else velocity, dtype=float)
+        given = velocity(x) if callable(velocity) else velocity
+        values = real_numbers(self._space.mesh.comm, "velocity", given)
         good = values.shape in ((dim,), x.shape) and bool(np.all(np.isfinite(values)))
         agree(
             self._space.mesh.comm,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fenics_bridge.errors import real_numbers
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.types import OfPosition
 
@@ -20,8 +21,9 @@ def at_positions(pressure: Any, outside: OfPosition | None) -> OfPosition:
     """
 
     def at(points: ArrayLike) -> NDArray[np.float64]:
-        x = np.ascontiguousarray(points, dtype=float)
-        search = PointSearch(pressure.function_space.mesh, x)
+        mesh = pressure.function_space.mesh
+        x = real_numbers(mesh.comm, "points", points)
+        search = PointSearch(mesh, x)
         values = search.values(pressure)[:, 0]
         elsewhere = np.zeros(len(x)) if outside is None else np.broadcast_to(outside(x), len(x))
         return np.where(search.found, values, elsewhere)

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import ufl
 from mpi4py import MPI
+from mpm_core.checks import real_numbers
 from ufl.core.expr import Expr
 
 from fenics_bridge.errors import InputError, is_finite
@@ -177,11 +178,11 @@ class Tabulated(_Curve):
         if len(lengths) != 1 or lengths == {1} or lengths == {0}:
             raise InputError(f"suction, saturation_values and permeability_values have {sorted(lengths)} values, "
                              "expected the same number of each, at least two")  # fmt: skip
-        s = np.asarray(self.suction, dtype=float)
+        s = real_numbers("suction", self.suction)
         if not (s[0] == 0 and np.all(np.diff(s) > 0) and np.all(np.isfinite(s))):
             raise InputError(f"suction is {self.suction!r} Pa, expected rising values from 0 on")
         for name in ("saturation_values", "permeability_values"):
-            values = np.asarray(getattr(self, name), dtype=float)
+            values = real_numbers(name, getattr(self, name))
             wrong = np.flatnonzero(~(np.diff(values) <= 0))
             if len(wrong):
                 k = wrong[0]

@@ -24,7 +24,7 @@ from mpm_core.water_checks import LABORATORY_GRAVITY
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree, is_finite
+from fenics_bridge.errors import agree, is_finite, require_mesh
 from fenics_bridge.types import MeshTags, OfPosition
 from fenics_bridge.views import body_text
 from fenics_bridge.water.applied import AppliedBoundary
@@ -88,6 +88,7 @@ class Seepage:
         loading: Callable[[NDArray[np.float64], float], ArrayLike] | None = None,
         gravity: float = LABORATORY_GRAVITY,
     ) -> None:
+        require_mesh(domain)
         comm = domain.comm
         agree(comm, None if degree in (1, 2) else f"degree is {degree!r}, expected 1 or 2")
         given = given_water(comm, unit_weight, gravity, water_modulus)

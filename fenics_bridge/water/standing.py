@@ -11,7 +11,7 @@ from mpm_core.water_checks import LABORATORY_GRAVITY
 from numpy.typing import NDArray
 
 from fenics_bridge.compat import facet_nodes
-from fenics_bridge.errors import agree
+from fenics_bridge.errors import agree, require_mesh
 from fenics_bridge.fem.supports import tagged_facets
 from fenics_bridge.types import MeshTags
 from fenics_bridge.water.boundary import Reservoir, WaterBoundary, value_at
@@ -40,6 +40,7 @@ def standing_water(
     Raises:
         InputError: the mesh has not two dimensions, a tag is unknown, or there is no reservoir. Raised on all ranks alike.
     """
+    require_mesh(domain)
     dim, weight = domain.geometry.dim, given_water(domain.comm, unit_weight, gravity).unit_weight
     agree(domain.comm, None if dim == 2 else f"domain has {dim} dimensions, expected a plane section")
     reservoirs = [condition for condition in boundary if isinstance(condition, Reservoir)]
@@ -81,6 +82,7 @@ def ground_lines(domain: Mesh, facet_tags: MeshTags, tag: int | str) -> list[Lin
     Raises:
         InputError: no facet has the tag. Raised on all ranks alike.
     """
+    require_mesh(domain)
     facets = tagged_facets(domain.comm, facet_tags, tag, "boundary")
     nodes = domain.geometry.x[facet_nodes(domain, facets)][:, :, :2]
     ends = np.concatenate(domain.comm.allgather(nodes))  # (k, 2, 2), those of ghosts several times

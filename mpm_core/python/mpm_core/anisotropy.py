@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ._core import InputError
+from .checks import real_numbers
 
 
 def tensors_of_laws(anisotropy: Any, laws: int, dim: int) -> list[list[list[float]]]:
@@ -30,8 +31,8 @@ def tensors_of_laws(anisotropy: Any, laws: int, dim: int) -> list[list[list[floa
 
 def _tensor(entry: Any, dim: int) -> list[list[float]]:
     try:
-        values = np.ones(dim) if entry is None else np.asarray(entry, dtype=float)
-    except (TypeError, ValueError):
+        values = np.ones(dim) if entry is None else real_numbers("anisotropy", entry)
+    except InputError:
         values = np.empty(0)
     square = np.diag(values) if values.shape == (dim,) else values
     good = square.shape == (dim, dim) and bool(np.all(np.isfinite(square))) and np.allclose(square, square.T)

@@ -4,6 +4,7 @@ import warnings
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ._core import InputError
 
@@ -27,6 +28,23 @@ def within(name: str, value: float, low: float, high: float, *, open_above: bool
     if not (low <= value < high or (value == high and not open_above)):
         raise InputError(f"{name} is {value}, expected {low} <= {name} {'<' if open_above else '<='} {high}")
     return float(value)
+
+
+def real_numbers(name: str, values: Any) -> NDArray[np.float64]:
+    """Real numbers of any shape, infinite ones too; text, which NumPy would read, and complex numbers are refused."""
+    try:
+        array = np.asarray(values)
+        is_real = array.dtype.kind in "iuf"
+    except ValueError:  # rows of different lengths
+        is_real = False
+    if not is_real:
+        raise InputError(f"{name} is {_shown(values)}, expected real numbers")
+    return array.astype(np.float64)
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 100 else f"{text[:97]}..."
 
 
 def member(name: str, value: Any, kind: Any) -> Any:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import InputError, RunError, law_types
-from .checks import positive, within
+from .checks import positive, real_numbers, within
 from .mesh import floats
 
 MAX_ITERATIONS = 50
@@ -66,8 +66,9 @@ class ElementTest:
         """
         self._dt = within("dt", dt, 0, np.inf)
         try:
-            increment = np.array(strain_increment, dtype=float)
-        except (TypeError, ValueError):
+            given = [np.nan if component is None else component for component in strain_increment]  # type: ignore[union-attr]
+            increment = real_numbers("strain_increment", given)
+        except (TypeError, InputError):
             raise InputError(f"strain_increment is {strain_increment!r}, expected numbers, or None") from None
         if increment.shape != self.stress.shape:
             raise InputError(f"strain_increment has shape {increment.shape}, expected {self.stress.shape}")

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._core import InputError
+from .checks import real_numbers
 from .collective import collectively
 from .rows import find_items, request_rows
 from .views import mesh_text
@@ -191,7 +192,7 @@ class Mesh:
             >>> list(model.explicit(until=1.0, rebalance=1.2))
             >>> start.nodal_of(model.mesh, model.nodal("velocity"))
         """
-        array = np.ascontiguousarray(values, dtype=np.float64)
+        array = np.ascontiguousarray(real_numbers("values", values))
         if array.ndim not in (1, 2) or len(array) != len(other.points):
             raise InputError(f"values has shape {array.shape}, expected a row for each of {len(other.points)} nodes")
         if other is self:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import InputError
+from .checks import real_numbers
 
 STANDARD_GRAVITY = 9.80665
 """The unit g [m/s2]"""
@@ -106,10 +107,7 @@ def read_acceleration(path: str | os.PathLike[str], *, unit: str) -> tuple[NDArr
 
 
 def _column(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    try:
-        column = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} is {values!r}, expected numbers") from None
+    column = real_numbers(name, values)
     if column.ndim != 1 or not np.isfinite(column).all():
         raise InputError(f"{name} has shape {column.shape}, expected (n,) of finite numbers")
     return column

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import Hencky, Heterogeneous, InputError, Undrained
+from .checks import real_numbers
 from .mesh import Tag, floats
 
 Field = float | ArrayLike | Callable[[NDArray[np.float64]], ArrayLike] | Mapping[Tag, float]
@@ -125,7 +126,7 @@ class RandomField:
         lognormal: bool = False,
         waves: int = 1000,
     ) -> None:
-        scale = np.asarray(lengths, dtype=float)
+        scale = real_numbers("lengths", lengths)
         if scale.ndim != 1 or not (scale > 0).all():
             raise InputError(f"lengths is {lengths!r}, expected a positive number [m] for each axis")
         if not deviation >= 0:

@@ -9,6 +9,7 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import InputError
+from .checks import real_numbers
 from .collective import collectively
 from .mesh import Mesh, floats
 from .parameter_fields import Field, differences_of, has_varying, nominal_value, parameter_values
@@ -74,7 +75,7 @@ class ParticleValues:
     def set_state(self, name: str, values: ArrayLike) -> None:
         """Overwrite a state variable by its name, in the particles whose law has it; shape (n,). Not collective."""
         state, material = self.particles.state.copy(), self.particles.material
-        new = np.asarray(values, dtype=np.float64)
+        new = real_numbers("values", values)
         if new.shape != material.shape:
             raise InputError(f"values has shape {new.shape}, expected {material.shape}, one for each particle")
         for number, column in self._state_columns(name):

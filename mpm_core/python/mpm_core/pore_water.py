@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._core import InputError
+from .checks import real_numbers
 from .anisotropy import tensors_of_laws
 from .collective import collectively
 from .conditions import Conditions
@@ -161,12 +162,12 @@ class PoreWater(Conditions):
         if isinstance(given, dict):
             tags, values = self.mesh.cell_tags[self.particles.cell], np.full(len(position), np.nan)
             for key, value in given.items():
-                values[np.isin(tags, self.mesh.tags_of("cell", key))] = float(value)
+                values[np.isin(tags, self.mesh.tags_of("cell", key))] = real_numbers(name, value)
             if np.isnan(values).any():
                 raise InputError(f"{name} has no value for the cell tag {tags[np.isnan(values)][0]}")
             return values
         found = given(position) if callable(given) else given
-        return np.array(np.broadcast_to(np.asarray(found, dtype=np.float64), len(position)))
+        return np.array(np.broadcast_to(real_numbers(name, found), len(position)))
 
     def set_pore_pressure(self, pressure: float | Callable[[NDArray], ArrayLike]) -> None:
         """Give the particles pore pressures: those at the nodes, and linear in each cell.
@@ -184,7 +185,7 @@ class PoreWater(Conditions):
         def at_nodes() -> NDArray[np.float64]:
             points = self.mesh.points
             found = pressure(points) if callable(pressure) else pressure
-            return floats("pressure", np.broadcast_to(np.asarray(found, dtype=float), len(points)), (len(points),))
+            return floats("pressure", np.broadcast_to(real_numbers("pressure", found), len(points)), (len(points),))
 
         corners = self.mesh.cells[self.particles.cell]
         values = collectively(self.comm, at_nodes)[corners]
@@ -378,7 +379,7 @@ def history_of(name: str, value: Value, least: float = -np.inf) -> History:
     Raises:
         InputError: numbers that are not finite or below the least, or times that do not rise.
     """
-    numbers = np.asarray(value, dtype=float)
+    numbers = real_numbers(name, value)
     pairs = np.array([[0.0, numbers]]) if numbers.ndim == 0 else numbers
     good = pairs.ndim == 2 and pairs.shape[1:] == (2,) and len(pairs) > 0 and bool(np.isfinite(pairs).all())
     if not good or np.any(np.diff(pairs[:, 0]) <= 0):

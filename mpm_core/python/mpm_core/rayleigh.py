@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import InputError
-from .checks import positive, within
+from .checks import positive, real_numbers, within
 from .mesh import floats
 
 
@@ -67,7 +67,7 @@ class Rayleigh:
         Raises:
             InputError: a frequency that is not positive.
         """
-        frequencies = floats("frequency", frequency, (None,) * np.ndim(frequency))
+        frequencies = real_numbers("frequency", frequency)
         if not (frequencies > 0).all():
             raise InputError(f"frequency is {frequencies.min():g} Hz, expected positive numbers")
         omega = 2 * np.pi * frequencies

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import InputError
+from .checks import real_numbers
 
 SUCTIONS = np.concatenate([[0.0], np.geomspace(1.0, 1e9, 541)])
 """Points of the curves [Pa]: 60 in each decade"""
@@ -55,7 +56,10 @@ def curve_values(curve: Any) -> list[NDArray[np.float64]]:
     missing = [name for name in CURVES if not callable(getattr(curve, name, None))]
     if missing:
         raise InputError(f"retention is {curve!r}, which has no {missing[0]}(), expected a retention curve")
-    values = [np.array(np.broadcast_to(getattr(curve, name)(SUCTIONS), len(SUCTIONS)), dtype=float) for name in CURVES]
+    values = [
+        np.broadcast_to(real_numbers(f"in retention, {name}", getattr(curve, name)(SUCTIONS)), len(SUCTIONS))
+        for name in CURVES
+    ]
     for name, found in zip(CURVES, values, strict=True):
         rises = np.flatnonzero(~(np.diff(found) <= 1e-12))
         if len(rises):

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._core import Geometry, InputError
-from .checks import positive
+from .checks import positive, real_numbers
 from .mesh import floats
 from .surfaces import Box, Disc, Sphere, Surface
 
@@ -77,8 +77,8 @@ def history(name: str, value: Velocity, size: int, unit: str) -> tuple[list[floa
             values = values[:, None]
         return times.tolist(), floats(f"values of the {name} [{unit}]", values, (len(times), size)).tolist()
     try:
-        constant = np.asarray(value, dtype=float)
-    except (TypeError, ValueError) as error:
+        constant = real_numbers(name, value)
+    except InputError as error:
         raise InputError(
             f"{name} is {value!r}, expected {size} numbers [{unit}], or a pair of times [s] and as many rows of them"
         ) from error
