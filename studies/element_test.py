@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from common.checks import check_effect
+from common.checks import check_effect, say
 from common.figures import curve_figure
 from common.history import History
 from common.options import add_choice, add_count, add_number, check, study_parser
@@ -19,9 +20,12 @@ from common.results import open_results
 from common.slope_case import add_soil_options
 from common.soils import add_law_options, check_law_options, law_of
 from common.summary import write_summary
+from mpm_core.setup_warnings import angles_in_radians
 
 import mpm_core as mpm
 
+SOFTEST = 10e3
+"""Oedometric modulus [Pa] below which there is no soil: mud has some 50 kPa"""
 TESTS = ("oedometer", "drained", "undrained", "shear")
 COLUMNS = ["axial_strain", "shear_strain", "volumetric_strain", "p_Pa", "q_Pa", "shear_stress_Pa",
            "excess_pore_pressure_Pa", "plastic_strain"]  # fmt: skip
@@ -55,7 +59,25 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     )
     check(p, own or a.material != "viscoplastic" or a.rate is not None,
           "--material is viscoplastic, expected --rate with it: in an infinitely slow test the viscosity has no effect")  # fmt: skip
+    say(in_percent(a))
     return a
+
+
+def in_percent(a: Namespace) -> str:
+    """What a warning says of a strain that is probably in percent; empty for others. Simple shear may go far."""
+    if a.strain <= (5.0 if a.test == "shear" else 1.0):
+        return ""
+    return f"--strain is {a.strain:g}, a fraction: {a.strain:g} % are {a.strain / 100:g}"
+
+
+def too_soft(a: Namespace, law: Any) -> str:
+    """What a warning says of a stiffness that is probably not in Pa; empty for others."""
+    if law.p_wave_modulus >= max(SOFTEST, a.pressure):
+        return ""
+    return (
+        f"the oedometric modulus of the soil is {law.p_wave_modulus:.4g} Pa, under a pressure of {a.pressure:g} Pa: moduli are in Pa, "
+        "200e3 and more for most soils"
+    )
 
 
 # --- 2. The test -----------------------------------------------------------------------------------------------------
@@ -137,6 +159,8 @@ def draw(history: History, a: Namespace, path: Path) -> None:
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     law = law_of(a)
+    say(too_soft(a, law))
+    say(angles_in_radians([law]))
     folder = open_results(a)
     test = mpm.ElementTest(law, [-a.pressure] * 3 + [0.0] * 3)
     with History(folder / "history.csv", COLUMNS) as history:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
+
+from mpi4py import MPI
 
 from .options import check
 
@@ -34,6 +37,12 @@ def check_whole(parser: argparse.ArgumentParser, cells: float, message: Callable
 def check_file(parser: argparse.ArgumentParser, path: Path | None, name: str) -> None:
     """End with an error when an option names a file that is not there."""
     check(parser, path is None or path.is_file(), lambda: f"{name} is {path}, but there is no such file")
+
+
+def say(text: str) -> None:
+    """Warn of what is probably a mistake; nothing for an empty text. The first rank does."""
+    if text and MPI.COMM_WORLD.rank == 0:
+        warnings.warn(text, RuntimeWarning, stacklevel=3)
 
 
 MOST_CELLS = 2e7

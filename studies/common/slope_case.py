@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 from mpm_core.probes import nearest_particle
-from mpm_core.setup_warnings import angles_in_radians
+from mpm_core.setup_warnings import angles_in_radians, in_radians
 
 import fenics_bridge as bridge
 import mpm_core as mpm
 
-from .checks import check_cells
+from .checks import check_cells, say
 from .options import add_choice, add_number, check
 from .plots import Scene
 from .quiet import NOT_REACHED, without_warning
@@ -85,6 +85,7 @@ def check_slope_options(parser: argparse.ArgumentParser, options: argparse.Names
           lambda: f"--cell-size is {options.cell_size:g} m, expected at most --height, {options.height:g} m, and --crest, "
                   f"{options.crest:g} m")  # fmt: skip
     _check_mesh(parser, options)
+    say(in_radians("--angle", options.angle))
     if getattr(options, "material", None) is not None:
         check_law_options(parser, options)
 

@@ -23,7 +23,7 @@ ON_EARTH = 10.0
 """Gravity [m/s2] by which soils have these unit weights; that of a centrifuge may be any number of times as large"""
 
 RADIANS = (0.1, 1.57)
-"""Friction angles [degrees] that are more probably angles in radians, of soils from 6 to 90 degrees"""
+"""Friction angles, and those of slopes, [degrees] that are more probably angles in radians, of soils from 6 to 90 degrees"""
 
 STEEPEST_FRICTION = 2.0
 """Coefficient of friction, of an angle of 63 degrees, above which it is more probably an angle"""
@@ -222,10 +222,16 @@ def _beyond_preconsolidation(model: Model) -> str:
 def angles_in_radians(laws: Iterable[Any]) -> str:
     """What a warning says of a friction angle that is probably in radians; empty where there is none."""
     angles = {getattr(law, "friction_angle", 0.0) for each in laws for law in with_inner_laws(each)}
-    odd = sorted(angle for angle in angles if isinstance(angle, (int, float)) and RADIANS[0] <= angle <= RADIANS[1])
-    if not odd:
+    numbers = sorted(angle for angle in angles if isinstance(angle, (int, float)))
+    found = (in_radians("the friction angle", angle) for angle in numbers)
+    return next((text for text in found if text), "")
+
+
+def in_radians(name: str, angle: float) -> str:
+    """What a warning says of an angle that is probably in radians; empty for others."""
+    if not RADIANS[0] <= angle <= RADIANS[1]:
         return ""
-    return f"the friction angle is {odd[0]:g} degrees; angles are in degrees, and {odd[0]:g} rad are {np.degrees(odd[0]):.1f} degrees"
+    return f"{name} is {angle:g} degrees; angles are in degrees, and {angle:g} rad are {np.degrees(angle):.1f} degrees"
 
 
 def warn_of_friction(comm: MPI.Comm, friction: float) -> None:

@@ -124,3 +124,20 @@ def test_a_bank_of_resting_cells_fails_back_as_one_of_particles(tmp_path):
     assert coupled["initial_out_of_balance_ratio"] < 1e-6
     assert abs(coupled["runout_m"] - particles["runout_m"]) < 0.2  # two tenths of a cell
     assert coupled["work_of_stresses_J_per_m"] == pytest.approx(particles["work_of_stresses_J_per_m"], rel=0.03)
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        (["--strain", "20"], "warning: --strain is 20, a fraction: 20 % are 0.2"),
+        (["--test", "shear", "--strain", "20"], "warning: --strain is 20, a fraction"),
+        (["--young", "9000"], "under a pressure of 20000 Pa: moduli are in Pa"),  # in kPa
+        (["--young", "9", "--pressure", "0"], "under a pressure of 0 Pa: moduli are in Pa"),  # in MPa
+        (["--friction-angle", "0.5"], "0.5 rad are 28.6 degrees"),
+        (["--test", "shear", "--strain", "2"], ""),
+    ],
+)
+def test_quantities_in_other_units_are_warned_of(tmp_path, options, words):
+    result = study("element_test", tmp_path, "--steps", "5", *options)
+    assert result.returncode == 0 and words in result.stderr
+    assert result.stderr.count("warning: ") == bool(words)

@@ -39,6 +39,12 @@ def test_a_friction_angle_in_radians_is_named_where_the_slope_does_not_carry_its
     assert result.returncode == 2 and "0.43 rad are 24.6 degrees" in result.stderr
 
 
+def test_an_inclination_in_radians_is_warned_of(tmp_path):
+    result = slope(tmp_path, "--angle", "0.78", "--time", "0.001", "--no-pictures")
+    assert result.returncode == 0 and "warning: --angle is 0.78 degrees; " in result.stderr
+    assert "0.78 rad are 44.7 degrees" in result.stderr
+
+
 def test_elastic_start_is_in_equilibrium_too(tmp_path):
     assert slope(tmp_path, "--initial", "elastic").returncode == 0
     assert json.loads((tmp_path / "summary.json").read_text())["initial_out_of_balance_ratio"] < 1e-8
