@@ -12,7 +12,7 @@ import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
-from mpm_core.setup_warnings import UNIT_WEIGHTS
+from mpm_core.setup_warnings import UNIT_WEIGHTS, is_unit_weight
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
@@ -99,7 +99,7 @@ def _arrays(tractions: Any) -> Any:
 def warn_of_weight(comm: MPI.Comm, load: Load) -> None:
     """Warn of a unit weight that no soil has, such as one in kN/m3 or one that acts upwards; none is fine."""
     weights = [float(weight) for weight in _weight_by_tag(load.unit_weight).values()]
-    odd = [weight for weight in weights if weight and not UNIT_WEIGHTS[0] <= abs(weight) <= UNIT_WEIGHTS[1]]
+    odd = [weight for weight in weights if weight and not is_unit_weight(abs(weight))]
     upwards = [weight for weight in weights if weight < 0]
     texts = []
     if upwards:
@@ -110,7 +110,7 @@ def warn_of_weight(comm: MPI.Comm, load: Load) -> None:
     if odd:
         texts.append(
             f"the unit weight is {odd[0]:.4g} N/m3, expected from {UNIT_WEIGHTS[0]:g} to {UNIT_WEIGHTS[1]:g} N/m3 for a soil: unit "
-            "weights are in N/m3, 20e3 for most soils"
+            "weights are in N/m3, 20e3 for most soils, and n times that in a centrifuge under n g"
         )
     for text in texts if comm.rank == 0 else ():
         warnings.warn(text, RuntimeWarning, stacklevel=3)

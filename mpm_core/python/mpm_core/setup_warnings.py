@@ -19,6 +19,9 @@ UNIT_WEIGHTS = (1e3, 150e3)
 """Bounds of the unit weight of a soil [N/m3]: peat has 10 kN/m3, published slopes have up to 80, and 16 kN/m3 taken for a density
 gives 157"""
 
+SPUN_UNIT_WEIGHTS = (300e3, 6e6)
+"""Bounds of the unit weight of a soil in a centrifuge [N/m3], from some 15 to 250 g; 16 to 25 kN/m3 taken for a density lie below"""
+
 ON_EARTH = 10.0
 """Gravity [m/s2] by which soils have these unit weights; that of a centrifuge may be any number of times as large"""
 
@@ -166,6 +169,11 @@ def _weight(model: Model) -> str:
         f"the unit weight of particles is {odd:.4g} N/m3, density times {gravity:g} m/s2, expected from {UNIT_WEIGHTS[0]:g} to "
         f"{UNIT_WEIGHTS[1]:g} N/m3 for a soil: densities are in kg/m3, 2000 for most soils"
     )
+
+
+def is_unit_weight(weight: float) -> bool:
+    """Whether a soil may have a unit weight [N/m3], on earth or in a centrifuge."""
+    return any(low <= weight <= high for low, high in (UNIT_WEIGHTS, SPUN_UNIT_WEIGHTS))
 
 
 def _upwards(model: Model) -> str:

@@ -131,6 +131,18 @@ def test_other_units_and_directions_are_named(make, words):
         make()
 
 
+@pytest.mark.parametrize("weight", [20.0, 18e3 * 9.81, 20e6])  # in kN/m3, taken for a density, in mN/m3
+def test_unit_weights_that_no_soil_has_are_named(weight):
+    with pytest.warns(RuntimeWarning, match=r"unit weight is .* 20e3 for most soils, and n times that in a centrifuge"):
+        body().solve(bridge.Load(unit_weight=weight))
+
+
+def test_a_unit_weight_of_a_centrifuge_is_one():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        body().solve(bridge.Load(unit_weight=50 * 18e3))
+
+
 @pytest.mark.parametrize(
     ("load", "words"),
     [
