@@ -17,6 +17,7 @@ import numpy as np
 from common.checks import check_cells
 from common.figures import Pictures, save_figure
 from common.followed import cells_near, mean_displacement, numbers_in
+from common.lengths import metres
 from common.movie import frame_of, particle_frame, particle_movie
 from common.options import add_count, add_number, check, study_parser
 from common.page import Page
@@ -168,7 +169,7 @@ def slide(a: Namespace, mesh: tuple, fem: bridge.QuasiStatic, resting: bool, fol
                 frames.append(particle_frame(model, report.time))
             started = process_time()
     if comm.rank == 0:
-        print(f"{KINDS['coupled' if resting else 'particles']}: crest {rows[-1][1]:.4f} m, toe {rows[-1][2]:.4f} m, "
+        print(f"{KINDS['coupled' if resting else 'particles']}: crest {metres(rows[-1][1])}, toe {metres(rows[-1][2])}, "
               f"{seconds:.1f} s", file=sys.stderr, flush=True)  # fmt: skip
     p = model.particles
     corners = model.mesh.points[model.mesh.cells[p.cell]].reshape(-1, 6)

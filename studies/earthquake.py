@@ -31,6 +31,7 @@ from common.earthquake_site import (
 from common.figures import Pictures
 from common.followed import FollowedNodes, cells_near, mean_displacement, numbers_in
 from common.history import History
+from common.lengths import metres
 from common.motions import accelerations, noise_band, ricker
 from common.movie import gathered, own_frame, particle_movie
 from common.newmark import sliding_block, yield_acceleration
@@ -171,7 +172,7 @@ def shaken(a: Namespace, model: mpm.Model, until: float, folder: Path) -> tuple[
             history.add(**dict(zip(COLUMNS, (report.time, *velocity, *moved))))
             if k * a.frames // samples > (k - 1) * a.frames // samples:
                 frames.append(frame_at(model, report.time))
-            progress.show(report.time, report.steps, displacement=f"{moved[0] - moved[1]:.3f} m")
+            progress.show(report.time, report.steps, displacement=metres(moved[0] - moved[1]))
     return history, frames, report
 
 
@@ -306,8 +307,8 @@ def main(arguments: list[str] | None = None) -> int:
     page = Page(movies=[particle_movie("slope", scene, frames)], captions=captions)
     pictures = drawn(a, folder, record, history, slips, ratios, frames, scene) if a.pictures else {}
     said = (
-        f"slope displaced by {summary['slope_displacement_m']:.3f} m, Newmark's blocks by {slips['toe'][-1]:.3f} and "
-        f"{slips['crest'][-1]:.3f} m; linear amplification within {summary['largest_error_of_linear_amplification']:.1%} of "
+        f"slope displaced by {metres(summary['slope_displacement_m'])}, Newmark's blocks by {metres(slips['toe'][-1])} and "
+        f"{metres(slips['crest'][-1])}; linear amplification within {summary['largest_error_of_linear_amplification']:.1%} of "
         "the closed form"
     )
     return write_summary(folder, a, summary, comm, page, pictures, said)

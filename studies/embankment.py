@@ -15,6 +15,7 @@ from time import perf_counter
 import numpy as np
 from common import site_slides
 from common.interrupt import Interrupt
+from common.lengths import metres
 from common.movie import particle_movie
 from common.options import study_parser
 from common.page import Page
@@ -136,7 +137,7 @@ def main(arguments: list[str] | None = None) -> int:
         for who, message in (("finite elements", failed), ("particles", failed_particles)):
             if message:
                 print(f"{who}: {message}", file=sys.stderr)
-    said = f"slide, {slide}: largest displacement {moved:.3f} m after {result.history['time_s'][-1]:.3g} s"
+    said = f"slide, {slide}: largest displacement {metres(moved)} after {result.history['time_s'][-1]:.3g} s"
     code = write_summary(folder, a, summary, comm, Page(movies=movie, captions=CAPTIONS), drawn, said)
     return interrupt.exit_code or code
 

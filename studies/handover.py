@@ -16,6 +16,7 @@ from time import perf_counter
 import numpy as np
 from common.field_plots import save_curves
 from common.figures import Pictures
+from common.lengths import metres
 from common.movie import fem_frame, particle_frame, particle_movie
 from common.options import add_number, add_switch, check, study_parser
 from common.page import Page
@@ -99,7 +100,7 @@ def run(a: Namespace, fraction: float, unit_weight: float) -> dict:
     before = fem_frame(case.model, case.fem, 0.0, undeformed) if case.fem else None
     history, frames = slide(case, watch)
     if comm.rank == 0:
-        print(f"handed over at {fraction:.0%} of collapse: run-out {history[-1, 1]:.4f} m, crest {history[-1, 2]:.4f} m",
+        print(f"handed over at {fraction:.0%} of collapse: run-out {metres(history[-1, 1])}, crest {metres(history[-1, 2])}",
               file=sys.stderr, flush=True)  # fmt: skip
     return {"fraction": fraction, "unit_weight": unit_weight, "report": report, "history": history, "frames": frames,
             "before": before, "scene": case.scene()}  # fmt: skip

@@ -24,6 +24,7 @@ from common.checkpoint import check_restart
 from common.checks import check_cells
 from common.figures import Pictures, curve_figure
 from common.history import History
+from common.lengths import metres
 from common.movie import QUANTITIES, WET_QUANTITIES, particle_movie
 from common.options import add_number, check, formerly, study_parser
 from common.plots import CURVES, Scene, colour_limits, save_particles
@@ -233,7 +234,7 @@ def main(arguments: list[str] | None = None) -> int:
         "critical_time_step_s": model.critical_time_step(),
     }  # fmt: skip
     said = (
-        f"front moved by {results['runout_m']:.2f} m, crest by {results['crest_settlement_m']:.2f} m; water of "
+        f"front moved by {metres(results['runout_m'])}, crest by {metres(results['crest_settlement_m'])}; water of "
         f"{a.water_modulus:.3g} Pa: undrained wave {speeds.undrained:.0f} m/s, critical step "
         f"{1e6 * results['critical_time_step_s']:.0f} us"
     )

@@ -19,6 +19,7 @@ from common.animation import save_animation
 from common.figures import Pictures, curve_figure
 from common.history import History
 from common.interrupt import Interrupt
+from common.lengths import metres
 from common.movie import particle_frame, particle_movie
 from common.options import add_choice, add_count, add_number, add_switch, study_parser
 from common.output_options import add_picture_options
@@ -161,7 +162,7 @@ def slide(args: Namespace, size: float, folder: Path, interrupt: Interrupt) -> S
         try:
             for report in model.explicit(a.time, every=a.time / a.frames, damping=a.damping, pic=a.pic, nmd=a.nmd):
                 result.look(report)
-                progress.show(report.time, report.steps, runout=f"{history['runout_m'][-1]:.2f} m")
+                progress.show(report.time, report.steps, runout=metres(history["runout_m"][-1]))
                 result.at_rest = is_at_rest(history)
                 if interrupt.requested():
                     result.stopped = f"interrupted at {report.time:g} s"
@@ -244,7 +245,7 @@ def main(arguments: list[str] | None = None) -> int:
     }  # fmt: skip
     stopped = "; ".join(f"with cells of {r.cell_size:g} m {r.stopped}" for r in results if r.stopped) or None
     said = "\n".join(
-        f"cells of {r.cell_size:g} m: crest retrogressed by {f['retrogression_m']:.2f} m, run-out {f['runout_m']:.2f} m, work of the "
+        f"cells of {r.cell_size:g} m: crest retrogressed by {metres(f['retrogression_m'])}, run-out {metres(f['runout_m'])}, work of the "
         f"stresses {f['work_of_stresses_J_per_m'] / 1e6:.3f} MJ/m, {'' if f['at_rest'] else 'not '}at rest after {f['time_s']:.1f} s"
         for r, f in zip(results, found.values())
     )

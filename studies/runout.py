@@ -18,6 +18,7 @@ from common.checks import check_file
 from common.figures import Pictures
 from common.history import History
 from common.interrupt import Interrupt
+from common.lengths import metres
 from common.options import add_choice, add_count, add_number, check, study_parser
 from common.output_options import add_picture_options
 from common.progress import Progress
@@ -228,7 +229,7 @@ def main(arguments: list[str] | None = None) -> int:
     particles, volume = comm.allreduce(len(model.particles)), comm.allreduce(float(model.particles.volume.sum()))
     top = comm.allreduce(float(model.particles.position[:, 2].max(initial=-np.inf)), MPI.MAX)
     if comm.rank == 0:
-        print(f"{particles} particles, {volume:.4g} m3, lifted by {lift:.3f} m", file=sys.stderr)
+        print(f"{particles} particles, {volume:.4g} m3, lifted by {metres(lift)}", file=sys.stderr)
     start = perf_counter()
     history, stopped = run(a, model, ground, maps, folder)
     seconds, report = perf_counter() - start, model.report()

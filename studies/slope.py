@@ -27,6 +27,7 @@ from common.ensemble import Ensemble, further_members
 from common.figures import Pictures
 from common.history import History
 from common.interrupt import Interrupt
+from common.lengths import metres
 from common.movie import PORE, fem_frame, has_pore_pressure, particle_movie
 from common.options import add_choice, add_count, add_flag, add_number, add_switch, check, study_parser
 from common.output_options import add_output_options, add_picture_options, check_frames
@@ -248,7 +249,7 @@ def slide(
         if reached > drawn or interrupt.requested():
             watch.keep(report.time)
         drawn = reached
-        progress.show(report.time, report.steps, crest=f"{crest:.4f} m")
+        progress.show(report.time, report.steps, crest=metres(crest))
 
     def between_steps() -> bool:
         checkpoints.save_when_due()
@@ -328,7 +329,7 @@ def page(case: SlopeCase, frames: list[dict], summary: dict) -> Page:
         "figure_8_ensemble": "Displacement of the crest in all runs of the ensemble",
     }  # fmt: skip
     facts = {
-        "displacement of the crest": f"{summary['crest_displacement_m']:.3f} m", "run-out": f"{summary['runout_m']:.3f} m",
+        "displacement of the crest": metres(summary['crest_displacement_m']), "run-out": metres(summary['runout_m']),
         "simulated": f"{summary['time_s']:.4g} s", "particles": f"{summary['particles']:,}",
     }  # fmt: skip
     viscosity = f", viscosity {a.viscosity:g} Pa s" if a.material == "viscoplastic" else ""
@@ -445,7 +446,7 @@ def start_line(a: Namespace, start: dict[str, float]) -> str:
 
 def print_summary(summary: dict, folder: Path) -> None:
     print(
-        f"crest displacement {summary['crest_displacement_m']:.4f} m, run-out {summary['runout_m']:.3f} m at "
+        f"crest displacement {metres(summary['crest_displacement_m'])}, run-out {metres(summary['runout_m'])} at "
         f"{summary['time_s']:g} s; {summary['particle_steps_per_second'] / 1e6:.1f} million particle-steps per second"
     )
     print(f"results in {folder}", flush=True)

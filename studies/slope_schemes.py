@@ -17,6 +17,7 @@ from time import process_time
 import matplotlib.pyplot as plt
 import numpy as np
 from common.figures import Pictures, curve_figure, save_figure
+from common.lengths import metres
 from common.movie import particle_movie
 from common.options import add_choice, add_count, add_number, add_switch, study_parser
 from common.page import Page
@@ -136,7 +137,7 @@ def slide(a: Namespace, name: str, scheme: str, solver: str, multiple: float | N
                 run.curve.append((report.time, watch.crest_displacement()))
                 run.unbalanced_ratio = report.unbalanced_ratio
                 run.iterations += getattr(report, "iterations", 0)
-                progress.show(report.time, report.steps, crest=f"{run.curve[-1][1]:.4f} m")
+                progress.show(report.time, report.steps, crest=metres(run.curve[-1][1]))
                 if run.curve[-1][0] >= kept * until:
                     watch.keep(report.time)
                     kept += 1 / FRAMES

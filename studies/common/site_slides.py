@@ -22,6 +22,7 @@ from .animation import save_animation
 from .figures import Pictures
 from .history import History
 from .interrupt import Interrupt
+from .lengths import metres
 from .movie import particle_frame, particle_movie
 from .options import add_count, add_number, add_switch
 from .output_options import add_picture_options
@@ -119,7 +120,7 @@ def slide(
             for report in scheme(model.time + a.time, **options):
                 result.look(report)
                 update()
-                progress.show(report.time, report.steps, largest=f"{history['largest_displacement_m'][-1]:.2f} m")
+                progress.show(report.time, report.steps, largest=metres(history["largest_displacement_m"][-1]))
                 if interrupt.requested():
                     return result, f"interrupted at {report.time:g} s"
         except mpm.RunError as error:
@@ -188,7 +189,7 @@ def site_slide(a: Namespace) -> int:
     }  # fmt: skip
     scene = scene_of(model, sorted(site.laws))
     movies = [particle_movie(f"strength divided by {a.factor:g}", scene, result.frames)]
-    said = f"strength divided by {a.factor:g}: largest displacement {moved:.3f} m after {result.history['time_s'][-1]:.3g} s"
+    said = f"strength divided by {a.factor:g}: largest displacement {metres(moved)} after {result.history['time_s'][-1]:.3g} s"
     page, pictures = Page(movies=movies, captions=CAPTIONS), slide_pictures(a, result, scene, folder)
     code = write_summary(folder, a, summary, comm, page, pictures, said)
     return interrupt.exit_code or code

@@ -23,6 +23,7 @@ from particle_player import Movie
 
 from .figures import Pictures
 from .interrupt import Interrupt
+from .lengths import metres
 from .movie import particle_movie
 from .options import add_choice, add_flag, add_number
 from .scenes import scene_of
@@ -71,7 +72,7 @@ def slide_of(
         result, stopped = slide(a, model, folder, interrupt, act, step)
     moved = result.history["largest_displacement_m"][-1]
     if comm.rank == 0:
-        print(f"slide from {in_days(instant.time)} on: largest displacement {moved:.3f} m after "
+        print(f"slide from {in_days(instant.time)} on: largest displacement {metres(moved)} after "
               f"{result.history['time_s'][-1]:.3g} s")  # fmt: skip
         if stopped:
             print(f"the slide ended early: {stopped}", file=sys.stderr)

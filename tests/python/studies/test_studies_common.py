@@ -20,6 +20,7 @@ from studies.common import animation, interrupt, plots
 from studies.common.files import NOT_WRITTEN
 from studies.common.history import History
 from studies.common.interrupt import Interrupt
+from studies.common.lengths import metres
 from studies.common.options import add_choice, add_count, add_number, add_switch, check, study_parser
 from studies.common.progress import Progress
 from studies.common.summary import versions, write_summary
@@ -292,3 +293,12 @@ def test_films_have_their_frames(tmp_path, monkeypatch, has_ffmpeg):
     )
     assert path.suffix == (".mp4" if has_ffmpeg else ".gif")
     assert path.stat().st_size > 2000
+
+
+@pytest.mark.parametrize(
+    "length, text",
+    [(0.4712, "0.471 m"), (12.3456, "12.346 m"), (-0.25, "-0.250 m"), (3.96e-4, "0.000396 m"), (-1.29e-6, "-1.29e-06 m"),
+     (0.0, "0 m"), (-3e-17, "0 m")],
+)  # fmt: skip
+def test_small_lengths_are_printed_with_significant_digits(length, text):
+    assert metres(length) == text
