@@ -1,5 +1,6 @@
 #include "model/model.h"
 
+#include "base/number_text.h"
 #include "model/mapping.h"
 #include "model/resting_nodes.h"
 #include "parallel/agreement.h"
@@ -23,12 +24,13 @@ void check_particles(const Particles<D>& particles)
                     for (std::size_t p = 0; p < column.size(); ++p)
                       if (!std::isfinite(static_cast<double>(column[p])))
                         throw InputError(std::string(name) + " of particle " + std::to_string(particles.id[p]) +
-                                         " is " + std::to_string(column[p]) + ", expected a finite number");
+                                         " is " + number_text(static_cast<double>(column[p])) +
+                                         ", expected a finite number");
                   });
   for (std::size_t p = 0; p < particles.id.size(); ++p)
     if (!(particles.mass[p] > 0 && particles.volume[p] > 0))
       throw InputError("mass and volume of particle " + std::to_string(particles.id[p]) + " are " +
-                       std::to_string(particles.mass[p]) + " and " + std::to_string(particles.volume[p]) +
+                       number_text(particles.mass[p]) + " and " + number_text(particles.volume[p]) +
                        ", expected positive numbers");
 }
 } // namespace

@@ -1,5 +1,6 @@
 #include "particles/seed.h"
 
+#include "base/number_text.h"
 #include "mesh/search.h"
 
 #include <algorithm>
@@ -77,7 +78,7 @@ template <int D>
 void check_soil(const SeedMaterial& soil)
 {
   if (!(soil.density > 0 && std::isfinite(soil.density)))
-    throw InputError("density is " + std::to_string(soil.density) + " kg/m3, expected a positive number");
+    throw InputError("density is " + number_text(soil.density) + " kg/m3, expected a positive number");
 }
 
 template <int D>

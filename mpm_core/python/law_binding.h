@@ -2,6 +2,7 @@
 /// @file
 /// Laws on NumPy arrays: one row per point.
 
+#include "base/number_text.h"
 #include "materials/laws/point_moduli.h"
 #include "python/arrays.h"
 #include "python/law_arguments.h"
@@ -109,7 +110,7 @@ BatchReport update_arrays(const L& law, const py::array& strain_increment, py::a
   check_array<double>("stress", stress, {n, width});
   check_array<double>("state", state, {n, n_state(law)});
   if (!(dt >= 0))
-    throw InputError("dt is " + std::to_string(dt) + " s, expected at least 0 (infinite for slow loading)");
+    throw InputError("dt is " + number_text(dt) + " s, expected at least 0 (infinite for slow loading)");
   PointRows rows{};
   if (!tangent.is_none())
   {

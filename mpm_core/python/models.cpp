@@ -1,5 +1,6 @@
 #include "python/bindings.h"
 
+#include "base/number_text.h"
 #include "explicit/run.h"
 #include "explicit/two_phase_step.h"
 #include "model/absorbing.h"
@@ -53,7 +54,7 @@ void require_radii(const Mesh<G::dim>& mesh)
   if constexpr (G::has_hoop)
     for (const auto& point : mesh.points)
       if (point[0] < 0)
-        throw InputError("points has a node at the radius x = " + std::to_string(point[0]) +
+        throw InputError("points has a node at the radius x = " + number_text(point[0]) +
                          " m, expected 0 or more in axial symmetry, where the axis is x = 0");
 }
 

@@ -50,6 +50,7 @@ TEST(LawParameters, RefusesByNameValueAndRange)
     EXPECT_NE(refusal(LinearElastic{young, 0.3}).find("young"), std::string::npos) << young;
   starts(LinearElastic{1, 0.5}, "poisson = 0.5, but it must be in (-1, 0.5)");
   starts(LinearElastic{1, -1}, "poisson = -1, ");
+  starts(LinearElastic{1, 0.7}, "poisson = 0.7, "); // 17 digits of this number are 0.69999999999999996
   starts(LinearElastic{1, not_a_number}, "poisson = ");
   starts(MohrCoulomb{-5, 0.3, 1e3, 25}, "young = -5, ");
   starts(MohrCoulomb{1e6, 0.5, 1e3, 25}, "poisson = 0.5, ");

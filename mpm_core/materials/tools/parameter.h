@@ -3,6 +3,7 @@
 /// How a law declares its parameters: once, in its struct. Checks, the Python class, its help and the documentation
 /// follow from the declaration.
 
+#include "base/number_text.h"
 #include "base/types.h"
 
 #include <cmath>
@@ -143,9 +144,6 @@ std::string range_text(const Parameter<L>& parameter);
 /// Throws InputError, with name, value and range, for the first parameter that is out of its range.
 template <class L>
 void check_parameters(const L& law);
-
-/// A number as short as it can be
-std::string number_text(double number);
 
 /// Throws InputError with a parameter's name, its value and what it must be.
 [[noreturn]] void refuse(std::string_view name, double value, std::string_view range);

@@ -1,8 +1,9 @@
 #pragma once
 
+#include "base/number_text.h"
 #include "base/types.h"
 
-#include <sstream>
+#include <string>
 #include <string_view>
 
 namespace mpm::materials
@@ -12,9 +13,6 @@ inline void require(bool allowed, std::string_view name, double value, std::stri
 {
   if (allowed)
     return;
-  std::ostringstream message;
-  message.precision(17);
-  message << name << " = " << value << ", but it must be " << range;
-  throw InputError(message.str());
+  throw InputError(std::string(name) + " = " + number_text(value) + ", but it must be " + std::string(range));
 }
 } // namespace mpm::materials
