@@ -41,7 +41,8 @@ def save_record(path: Path, time: np.ndarray, acceleration: np.ndarray, velocity
             panel.plot(*before, color="#b0b0b0", linewidth=1.0, label="before baseline correction")
             panel.plot(*after, color=CURVES[0], linewidth=0.9, label="after baseline correction")
             panel.set(ylabel=label, xmargin=0)
-        axes[0].legend(ncols=2, loc="upper right", fontsize=8)
+        # Above the panel: a record may have its peak anywhere
+        axes[0].legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, fontsize=8)
         axes[-1].set_xlabel("Time [s]")
         axes[0].figure.align_ylabels(axes)
 

@@ -9,6 +9,8 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
 
+from common import figures  # noqa: E402
+from common.earthquake_plots import save_record  # noqa: E402
 from common.earthquake_site import outcrop_motion  # noqa: E402
 from common.motions import accelerations, as_motion, band_limited_noise, ricker  # noqa: E402
 from common.newmark import pulse_slip, sliding_block, yield_acceleration  # noqa: E402
@@ -145,3 +147,19 @@ def test_a_motion_is_not_amplified_at_frequencies_that_the_reference_lacks(smoot
     np.testing.assert_allclose(ratio, 2.0, rtol=1e-3)
     frequency, ratio = spectral_ratio(time, moved, reference, (1.0, 6.0), smoothing)
     assert len(frequency) > 100 and np.isnan(ratio).all()
+
+
+def test_the_names_of_curves_lie_beside_those_of_a_record_wherever_its_peak_is(tmp_path, monkeypatch):
+    boxes = []
+
+    def save(figure, _):
+        figure.canvas.draw()
+        panel = figure.axes[0]
+        boxes.extend([panel.get_legend().get_window_extent(), panel.get_window_extent()])
+
+    monkeypatch.setattr(figures, "save_figure", save)
+    time = np.linspace(0.0, 10.0, 1001)
+    acceleration = np.exp(time - 10.0) * np.sin(20 * time)  # the peak is at the end
+    save_record(tmp_path / "record.png", time, acceleration, as_motion(time, acceleration).velocity)
+    legend, panel = boxes
+    assert not legend.overlaps(panel)
