@@ -234,7 +234,7 @@ class PoreWater(Conditions):
         call changes the level. Along facets with a tag, at the sides of the mesh, use `hold_pore_pressure` besides.
 
         Args:
-            level: of the water along the last axis [m]; a table lets it fall or rise.
+            level: of the water along the last axis [m]; a table lets it fall or rise. Gravity across that axis is left out.
 
         Raises:
             InputError: on all ranks, for a model whose free surface is not drained, or a level that is not finite.

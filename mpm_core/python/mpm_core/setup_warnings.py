@@ -40,6 +40,9 @@ RETURNED = 0.01
 CUT_MOTION = 0.05
 """Fraction of the largest velocity of a motion at its ends above which it is probably cut off"""
 
+TILTED = 1e-6
+"""Fraction of gravity across the last axis above which it is more than round-off"""
+
 NEARLY_INCOMPRESSIBLE = 0.45
 """Poisson's ratio above which linear cells lock"""
 
@@ -49,7 +52,13 @@ def warn_of_setup(model: Model, nmd: bool, damping: float = 0.0) -> None:
     locks = "" if nmd else locking(model.laws)
     of_loads = _nothing_acts(model), _nothing_holds(model), _upwards(model), _weight(model) or _softness(model)
     of_laws = angles_in_radians(model.laws), _beyond_preconsolidation(model), locks
-    of_sides = *_held_sides(model), *_cut_motion(model), *_reversed_interfaces(model), _damped_waves(model, damping)
+    of_sides = (
+        *_held_sides(model),
+        *_cut_motion(model),
+        *_reversed_interfaces(model),
+        _damped_waves(model, damping),
+        _tilted_water(model),
+    )
     found = [text for text in (*of_loads, *of_laws, *of_sides) if text]
     if model.comm.rank == 0:
         for text in found:
@@ -181,6 +190,21 @@ def _upwards(model: Model) -> str:
     if up <= 0:
         return ""
     return f"gravity acts upwards, {up:g} m/s2 along the last axis, expected a component below zero there, such as -9.81 m/s2"
+
+
+def _tilted_water(model: Model) -> str:
+    """Of levels of water under gravity that is not along the last axis."""
+    water, across = model._core.water, float(np.linalg.norm(model.gravity[:-1]))
+    levels = any(is_level for _, _, is_level, *_ in model._water_conditions) or (
+        water is not None and bool(water.standing)
+    )
+    if not levels or across <= TILTED * float(np.linalg.norm(model.gravity)):
+        return ""
+    return (
+        f"gravity has a component of {across:g} m/s2 across the last axis, under which a surface of water at rest is inclined; levels "
+        "of water (hold_pore_pressure, stand_water) count along the last axis, with the gravity along it alone: turn the mesh, not "
+        "gravity, or give pressures"
+    )
 
 
 def _softness(model: Model) -> str:

@@ -79,6 +79,22 @@ def test_a_density_of_water_in_other_units_is_said(density):
         model_of().add_water(porosity=0.4, conductivity=1e-5, density=density)
 
 
+@pytest.mark.parametrize("across", [0.0, 1.0])
+@pytest.mark.parametrize("water", ["held", "standing", "pressure"])
+def test_levels_of_water_under_tilted_gravity_are_warned_of(across, water):
+    model = model_of()
+    model.set_gravity((across, -9.81))
+    model.add_water(porosity=0.4, conductivity=1e-3, modulus=1e7, drained_surface=water == "standing")
+    if water == "held":
+        model.hold_pore_pressure(4, level=1.5)
+    elif water == "standing":
+        model.stand_water(1.5)
+    else:
+        model.hold_pore_pressure(4, 0.0)
+    found = [text for text in said(model) if "gravity has a component of 1 m/s2 across the last axis" in text]
+    assert len(found) == (across > 0 and water != "pressure")
+
+
 def test_soil_in_a_centrifuge_has_a_usual_density():
     assert said(model_of(gravity=490.5, law=mpm.LinearElastic(young=100e6, poisson=0.3))) == []
     (one,) = said(model_of(gravity=490.5, density=18e3, law=mpm.LinearElastic(young=100e6, poisson=0.3)))
