@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
-from mpm_core import checks
 from mpm_core.collective import collectively
 from numpy.typing import NDArray
 
-from mpm_core import InputError
+from mpm_core import InputError, checks
 
 __all__ = ["InputError", "agree", "is_finite", "real_numbers", "require_mesh"]
 

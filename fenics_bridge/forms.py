@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ffcx.codegeneration import jit
+
 from mpm_core import RunError
 
 LOGGER = logging.getLogger("fenics_bridge.forms")

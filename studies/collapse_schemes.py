@@ -12,7 +12,7 @@ from time import process_time
 
 import numpy as np
 from common.field_plots import bend, save_curves
-from common.options import add_count, add_number, study_parser
+from common.options import add_number, study_parser
 from common.page import Page
 from common.ranks import run_study
 from common.results import open_results

@@ -16,7 +16,6 @@ from types import FrameType
 
 from talus.find import PACKAGE, SHIPPED
 
-
 ALONE = {"OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_pml": "ob1"}
 """With these Open MPI starts one process in a tenth of a second, without a network and a daemon, otherwise in four."""
 

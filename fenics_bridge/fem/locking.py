@@ -6,11 +6,11 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from mpm_core.setup_warnings import angles_in_radians, locking, locks_at_failure
 
 from fenics_bridge import compat
 from fenics_bridge.mesh.tagged import cell_volumes
 from mpm_core.mesh import cell_sizes
-from mpm_core.setup_warnings import angles_in_radians, locking, locks_at_failure
 
 if TYPE_CHECKING:
     from dolfinx import fem
@@ -68,8 +68,8 @@ def warn_of_few_cells(model: Any, mechanism: fem.Function) -> None:
     cells = (high.max() - low.min()) * count.sum() / total.sum()
     if cells < FEWEST and domain.comm.rank == 0:
         warnings.warn(
-            f"the soil that moves in the mechanism is {cells:.2g} cells high, so that averages of linear elements reach over all of it: the "
-            f"load or factor may be up to a tenth too low. Take cells that make it {FEWEST} high at least, or degree=2 (docs/fem.md)",
+            f"the soil that moves in the mechanism is {cells:.2g} cells high, so that averages of linear elements reach over all of it: "
+            f"the load or factor may be up to a tenth too low. Take cells that make it {FEWEST} high at least, or degree=2 (docs/fem.md)",
             RuntimeWarning,
             stacklevel=3,
         )

@@ -159,9 +159,9 @@ class QuasiStatic(SupportedBody, PointFunctions):
     ) -> None:
         """Change soils, laws, supports or pore pressures; `solve` then releases the resulting out-of-balance forces. Collective.
 
-        What is not given stays as it is. For stages, see `Stage`: cells of the soils in `off` carry no stress, stiffness or weight; cells that become
-        active start without stress and state, or with the given stress. Afterwards `load.held` is 1, and the body is
-        in equilibrium; `solve` to a load with `held` 0, as every new Load has, releases the forces in steps.
+        What is not given stays as it is. For stages, see `Stage`: cells of the soils in `off` carry no stress, stiffness or
+        weight; cells that become active start without stress and state, or with the given stress. Afterwards `load.held` is 1,
+        and the body is in equilibrium; `solve` to a load with `held` 0, as every new Load has, releases the forces in steps.
 
         Args:
             off: cell tags or names of the soils that are not there; () for none, None for those that are not there now.

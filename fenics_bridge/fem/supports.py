@@ -13,7 +13,7 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree, is_finite, require_mesh, InputError
+from fenics_bridge.errors import InputError, agree, is_finite, require_mesh
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.mesh.tagged import require_tags_of
 from fenics_bridge.types import MeshTags

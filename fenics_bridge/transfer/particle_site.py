@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mpm_core as mpm
-from fenics_bridge.errors import agree, real_numbers, InputError
+from fenics_bridge.errors import InputError, agree, real_numbers
 from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport
 from fenics_bridge.fem.supports import Support
 from fenics_bridge.transfer.particle_forces import boundary_forces, seepage_forces

@@ -9,7 +9,7 @@ import numpy as np
 from dolfinx import fem
 from numpy.typing import ArrayLike, NDArray
 
-from fenics_bridge.errors import agree, is_finite, real_numbers, InputError
+from fenics_bridge.errors import InputError, agree, is_finite, real_numbers
 from fenics_bridge.types import OfPosition
 
 

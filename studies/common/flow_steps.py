@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+
 from fenics_bridge import water
 
 from .water_site import DAY, corners_of, times_of

@@ -65,7 +65,8 @@ def add_damping(parser: argparse.ArgumentParser) -> None:
                at_least=0, below=1)  # fmt: skip
     add_number(parser, "--mass-damping", None, "1/s", "mass-proportional damping; results depend less on the mesh than with "
                "local damping (default: 5 for a height of 1 m, in inverse "
-               "proportion to its square root; 0 with local damping or affine transfer, for the paper's run, a site and quasi-static steps)", at_least=0)  # fmt: skip
+               "proportion to its square root; 0 with local damping or affine transfer, for the paper's run, a site and "
+               "quasi-static steps)", at_least=0)  # fmt: skip
     add_pic(parser, None, about="; default: 0.02 with mass damping, otherwise 0")
 
 
@@ -88,7 +89,8 @@ def choose_damping(parser: argparse.ArgumentParser, options: argparse.Namespace,
     if options.pic is None:
         options.pic = 0.02 if options.mass_damping > 0 else 0.0
     check(parser, options.mass_damping == 0 or (options.scheme != "quasi-static" and options.transfer == "flip"),
-          lambda: f"--mass-damping is {options.mass_damping:g}, expected --scheme explicit or implicit and --transfer flip with it")  # fmt: skip
+          lambda: f"--mass-damping is {options.mass_damping:g}, expected --scheme explicit or implicit and --transfer flip "
+                  "with it")  # fmt: skip
     check(parser, options.mass_damping == 0 or options.site is None,
           lambda: f"--mass-damping is {options.mass_damping:g}, expected 0 with --site")  # fmt: skip
 

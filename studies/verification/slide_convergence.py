@@ -7,8 +7,9 @@ slide must then converge. Its viscosity here is 1 kPa s, which raises the streng
 solution: each variant is compared with the run that differs from it in one parameter.
 
 On a smooth base the slope slides as one body without shear bands, and the results for the same soil without viscosity converge
-as well; they are compared after 0.6 s, also with cells that move with the soil, which no particle crosses. Under 80 kN/m³, with viscosity and the affine transfer, the results converge without
-damping while the slope comes to rest; they are compared after 4 s, and the crest moves by another tenth until 8 s.
+as well; they are compared after 0.6 s, also with cells that move with the soil, which no particle crosses. Under 80 kN/m³, with
+viscosity and the affine transfer, the results converge without damping while the slope comes to rest; they are compared after 4 s,
+and the crest moves by another tenth until 8 s.
 
 Local damping acts on the oscillations of the mesh, so that a slide with it depends on the cells. Forces against the motion of
 5 /s times the momentum brake a slide as well, and its crest then does not depend on them; compared after 4 s.

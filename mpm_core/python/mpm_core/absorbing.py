@@ -115,7 +115,8 @@ class AbsorbingSides:
             direction: in which the ground moves, shape (D,), of any length.
 
         Raises:
-            InputError: on all ranks: no side absorbs, or none without a free field; a direction without length; something else than a motion.
+            InputError: on all ranks: no side absorbs, or none without a free field; a direction without length; something else
+                than a motion.
         """
         self._let_in(motion, direction, 1.0)
 

@@ -44,11 +44,11 @@ class PenetrationWatch:
             self._warned.add(k)
             if model.comm.rank == 0:
                 stiffer = f"penalty=1 of add_contact in place of {entry['penalty']:g}" if entry["penalty"] < 1 else ""
+                kind, stress = type(surface_of(model, entry["surface"])).__name__, state["normal"] / state["area"]
                 warnings.warn(
-                    f"soil lies {cells:.2g} cells deep in rigid surface {k} ({type(surface_of(model, entry['surface'])).__name__}) on average at t = "
-                    f"{model.time:.6g} s, under {state['normal'] / state['area'] / 1e3:.3g} kPa: the contact is too soft for this "
-                    f"stress, and soil in cells that the surface cuts may generate energy. Use "
-                    f"{' or '.join(filter(None, [stiffer, 'a smaller courant']))} (docs/contact.md)",
+                    f"soil lies {cells:.2g} cells deep in rigid surface {k} ({kind}) on average at t = {model.time:.6g} s, under "
+                    f"{stress / 1e3:.3g} kPa: the contact is too soft for this stress, and soil in cells that the surface cuts "
+                    f"may generate energy. Use {' or '.join(filter(None, [stiffer, 'a smaller courant']))} (docs/contact.md)",
                     RuntimeWarning,
                     stacklevel=5,
                 )

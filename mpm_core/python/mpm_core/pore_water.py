@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._core import InputError
-from .checks import real_numbers
 from .anisotropy import tensors_of_laws
+from .checks import real_numbers
 from .collective import collectively
 from .conditions import Conditions
 from .mesh import Tag, floats

@@ -225,8 +225,10 @@ class SectionProbe:
         return f"<SectionProbe: plane through {self._point} m with the normal {self._normal}{box}>"
 
     def _cut(self, mesh: Mesh) -> None:
-        """Find the cells of this rank that the plane cuts, and the gradient of w in them; repeated after a repartition, and
-        each time while cells move."""
+        """Find the cells of this rank that the plane cuts, and the gradient of w in them.
+
+        Repeated after a repartition, and each time while cells move.
+        """
         corners = self.model.node_positions[mesh.cells[: mesh.owned_cells]]
         before = (corners - self._point) @ self._normal > 0
         cut: NDArray[np.bool_] = np.not_equal(before.any(axis=1), before.all(axis=1))

@@ -115,7 +115,7 @@ def test_particles_stay_where_they_are_in_their_cells(dim):
         return values[np.argsort(p.id)]
 
     before = shape_values()
-    report = run(model, 0.2, moving_cells=True)
+    run(model, 0.2, moving_cells=True)
     assert np.abs(p.displacement).max() > 0.1
     np.testing.assert_array_equal(by_id(model, "cell"), cells)
     np.testing.assert_allclose(shape_values(), before, atol=1e-11)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from core_cases import box, by_id
+from mpm_core.free_field import layers_at
+from mpm_core.ground_column import GroundColumn
 from test_laws_everywhere import CLAY, LAWS, PRESSURE, START
 
 import mpm_core as mpm
-from mpm_core.free_field import layers_at
-from mpm_core.ground_column import GroundColumn
 
 YOUNG, POISSON = 1e6, 0.3
 STRONG = {"poisson": POISSON, "cohesion": 1e9, "friction_angle": 30.0}

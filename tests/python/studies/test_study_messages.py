@@ -8,6 +8,7 @@ from argparse import Namespace
 from pathlib import Path
 
 import pytest
+
 from mpm_core import failure_watch
 
 STUDIES = Path(__file__).parents[3] / "studies"
@@ -22,7 +23,7 @@ def test_warnings_that_a_study_leaves_out_are_those_of_the_core():
 
     @quiet.without_warning(quiet.LOCKS)
     def warned(text):
-        warnings.warn(text, RuntimeWarning)
+        warnings.warn(text, RuntimeWarning, stacklevel=2)
 
     with warnings.catch_warnings():
         warnings.simplefilter("error")
