@@ -13,7 +13,7 @@ import pytest
 from mpi4py import MPI
 
 PYTHON_TESTS = Path(__file__).parents[1] / "python"
-sys.path[:0] = [str(PYTHON_TESTS / room) for room in (".", "laws", "io")]  # what tests on one rank use too
+sys.path[:0] = [str(PYTHON_TESTS / folder) for folder in (".", "laws", "io")]  # what tests on one rank use too
 
 
 LIMIT = float(os.environ.get("TALUS_TEST_LIMIT", 300))
