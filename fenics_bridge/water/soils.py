@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +22,7 @@ from fenics_bridge.errors import InputError, agree, is_finite
 from fenics_bridge.mesh.names import by_number, label
 from fenics_bridge.mesh.tagged import numbered_anew, owned_cells, tag_values
 from fenics_bridge.types import MeshTags
-from fenics_bridge.water.retention import AlwaysSaturated
+from fenics_bridge.water.retention import AlwaysSaturated, FreeSurface, Gardner, Tabulated, VanGenuchten
 
 WATER_DENSITY = 1000.0
 """Density of water [kg/m3]."""
@@ -200,15 +200,16 @@ def as_constants(domain: Mesh, soils: Sequence[Any]) -> list[Any]:
 
 
 def _constant(domain: Mesh, value: Any) -> Any:
-    """A number, an array, or the copy of a soil or a curve, whose checks are passed by, for forms."""
-    if is_dataclass(value):
+    """A number, an array, or the copy of a soil or a curve, whose checks are passed by, for forms; a user's own curve stays."""
+    if type(value) in (PorousSoil, VanGenuchten, Gardner, Tabulated, FreeSurface):
         result = copy(value)
         for each in fields(value):
             object.__setattr__(result, each.name, _constant(domain, getattr(value, each.name)))
         return result
     if isinstance(value, tuple):
         return tuple(_constant(domain, each) for each in value)
-    return None if value is None else fem.Constant(domain, np.asarray(value, dtype=np.float64))
+    is_number = isinstance(value, (int, float, np.number, np.ndarray))
+    return fem.Constant(domain, np.asarray(value, dtype=np.float64)) if is_number else value
 
 
 def set_by_soil(function: fem.Function, soils: Sequence[Any], cells: Sequence[NDArray[np.int32]], values: Any) -> None:

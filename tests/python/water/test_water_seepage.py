@@ -1,7 +1,10 @@
 """Seepage by finite elements against closed forms: a dam, a sheet pile, infiltration, drainage; its balance of water."""
 
+import math
+
 import numpy as np
 import pytest
+import ufl
 from dolfinx import mesh
 from mpi4py import MPI
 
@@ -337,6 +340,38 @@ class Rising(water.AlwaysSaturated):
 def test_curves_of_ones_own_that_are_not_possible_are_refused(saturation, permeability, message):
     with pytest.raises(InputError, match=message):
         water.PorousSoil(1e-6, retention=Rising(saturation, permeability))
+
+
+class PowerLaw:
+    """A curve of one's own, after Brooks and Corey, whose parameter is a number for Python's math."""
+
+    def __init__(self, entry, exponent):
+        self.entry, self.exponent = entry, math.exp(math.log(exponent))
+
+    def effective(self, suction):
+        ratio = suction / self.entry
+        if isinstance(suction, (float, np.ndarray)):
+            return np.maximum(ratio, 1.0) ** -self.exponent
+        return ufl.max_value(ratio, 1.0) ** -self.exponent
+
+    saturation = relative_permeability = effective
+
+
+def test_a_curve_of_ones_own_serves_as_one_of_the_package():
+    """A column drains under a table of its boundary; at rest saturation follows from hydrostatic suction."""
+    curve, height = PowerLaw(4e3, 2.0), 2.0
+    domain, facet_tags = box((0.2, height), (2, 40))
+    soil = water.PorousSoil(1e-4, porosity=0.4, retention=curve)
+    flow = water.Seepage(domain, soil, facet_tags, [water.Head(BASE, ((0.0, height), (60.0, 0.0)))], water_modulus=1e12)
+    flow.solve()
+    assert flow.stored_water() == pytest.approx(0.4 * 0.2 * height, rel=1e-6)
+    dt = 10.0
+    for _ in range(40):
+        assert flow.advance(dt)
+        dt = min(1.5 * dt, 1e6)
+    # Integral of 0.4 S over the height, S = 1 up to the entry height h and (h / z)^2 above it: 0.4 (h + h - h^2 / H).
+    entry = curve.entry / WEIGHT
+    assert flow.stored_water() == pytest.approx(0.4 * 0.2 * (2 * entry - entry**2 / height), rel=2e-3)
 
 
 @pytest.mark.parametrize("dt", [None, 0.0, -1.0, np.nan])
