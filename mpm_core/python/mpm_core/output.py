@@ -7,8 +7,9 @@ as ``000012-1.h5``, to which the first has links. The folder of a mesh also has 
 
 Fields are arrays of shape (n,) or (n, k). Two components are padded to three, so that they are vectors to ParaView; four
 and six components are a symmetric tensor, ``xx yy zz xy`` (of particles in axial symmetry ``xx yy hoop xy``) or
-``xx yy zz xy yz xz``, and become one dataset for each component, ``NAME_xx`` and so on; other numbers of components are kept
-as they are. Names consist of letters, digits, ``_`` and ``-``.
+``xx yy zz xy yz xz``, and become one dataset for each component, ``NAME_xx`` and so on; a field of four of which the name ends
+with ``_gradient`` has the components ``xx xy yx yy``. Other numbers of components are kept as they are.
+Names consist of letters, digits, ``_`` and ``-``.
 """
 
 from __future__ import annotations
@@ -71,7 +72,7 @@ class ParticleOutput(Output):
         self, path: str | os.PathLike[str], comm: MPI.Comm, float32: bool = True, compression: int = 0
     ) -> None:
         super().__init__(Series(path, comm, "particles", float32, compression))
-        self._out_of_plane = "zz"
+        self._axisymmetric = False
         self._position_type: np.dtype | None = None
 
     def write(self, time: float, fields: Mapping[str, np.ndarray]) -> None:
@@ -105,7 +106,7 @@ class ParticleOutput(Output):
             # Named as a field as well: some readers give the points of the first frame only. It costs no space.
             frame.describe_field("position", "Node", 3, points)
             for name, values in arrays.items():
-                frame.add_field(name, "Node", values, counts, self._out_of_plane)
+                frame.add_field(name, "Node", values, counts, self._axisymmetric)
         self._series.shared["vertices"] = (n, vertices)
 
 
@@ -251,7 +252,7 @@ class ModelOutput:
         if particles is not None:
             particle_output = ParticleOutput(particles, start.comm, float32, compression)
             if model.geometry == Geometry.AXISYMMETRIC:
-                particle_output._out_of_plane = "hoop"
+                particle_output._axisymmetric = True
             particle_output._position_type = type_of_positions(start.comm, start.points, particle_output._series.real)
             self._outputs.append(particle_output)
         if mesh is not None:

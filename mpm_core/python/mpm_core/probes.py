@@ -23,12 +23,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._core import InputError
 from .collective import collectively
+from .components import AXES, SYMMETRIC
 from .mesh import Mesh, floats
 from .model import Model
 from .row_file import RowFile
-
-AXES = ("x", "y", "z")
-STRESSES = {2: ("xx", "yy", "zz", "xy"), 3: ("xx", "yy", "zz", "xy", "yz", "xz")}
 
 
 class Probe(Protocol):
@@ -47,7 +45,7 @@ def _components(name: str, unit: str, parts: tuple[str, ...]) -> list[str]:
 
 
 def _vectors(dim: int, *names: tuple[str, str]) -> list[str]:
-    return [column for name, unit in names for column in _components(name, unit, AXES[:dim])]
+    return [column for name, unit in names for column in _components(name, unit, AXES[dim])]
 
 
 def _numbered(rows: NDArray, columns: list[str]) -> dict[str, float]:
@@ -100,7 +98,7 @@ class ParticleProbe:
         """Numbers of the particles."""
         dim = model.mesh.dim
         self._columns = _vectors(dim, ("position", "m"), ("displacement", "m"), ("velocity", "m/s"))
-        self._columns += _components("stress", "Pa", STRESSES[dim])
+        self._columns += _components("stress", "Pa", SYMMETRIC[dim])
 
     def __repr__(self) -> str:
         return f"<ParticleProbe: particles {', '.join(map(str, self.ids))}; {', '.join(self._columns)}>"
@@ -142,7 +140,7 @@ class PointProbe:
         self._columns = [
             "filled_fraction",
             *_vectors(dim, ("velocity", "m/s")),
-            *_components("stress", "Pa", STRESSES[dim]),
+            *_components("stress", "Pa", SYMMETRIC[dim]),
         ]
 
     def __repr__(self) -> str:
@@ -253,7 +251,7 @@ class SectionProbe:
         force = np.empty(dim)
         model.comm.Allreduce(mine, force)
         along = {"force_normal_N": float(force @ self._normal)}
-        names = _components("force", "N", AXES[:dim])
+        names = _components("force", "N", AXES[dim])
         return {"time_s": model.time, **dict(zip(names, map(float, force), strict=True)), **along}
 
 
@@ -275,7 +273,7 @@ class TotalsProbe:
     def values(self) -> dict[str, float]:
         """Numbers by name; see `Report`."""
         report, dim = self.model.report(), self.model.mesh.dim
-        momentum = dict(zip(_components("momentum", "N.s", AXES[:dim]), report.momentum, strict=True))
+        momentum = dict(zip(_components("momentum", "N.s", AXES[dim]), report.momentum, strict=True))
         energies = (
             "kinetic_energy", "nodal_kinetic_energy", "external_work", "internal_work", "stress_work", "stored_energy",
             "plastic_work", "damping_work", "support_work", "pic_loss", "unexplained_energy",

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from ._core import InputError, RunError
 from .collective import check_same_path, collectively, write_on_first_rank, written
+from .components import tensor_components
 from .hdf5 import RowsFile
 
-_TENSOR = {4: ("xx", "yy", "{out}", "xy"), 6: ("xx", "yy", "zz", "xy", "yz", "xz")}
 _TYPES = {1: "Scalar", 3: "Vector", 9: "Tensor"}
 _HEAD = '<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n'
 _TAIL = "</Grid>\n</Domain>\n</Xdmf>\n"
@@ -345,7 +345,7 @@ class Frame:
         )
 
     def add_field(
-        self, name: str, center: str, values: NDArray[Any], counts: Sequence[int], out_of_plane: str = "zz"
+        self, name: str, center: str, values: NDArray[Any], counts: Sequence[int], axisymmetric: bool = False
     ) -> None:
         """Add a field on nodes or cells: a tensor by its components, other real numbers as they are; whole ones as given.
 
@@ -354,12 +354,13 @@ class Frame:
             center: "Node" or "Cell".
             values: this rank's rows, (n,) or (n, k).
             counts: number of rows of each rank.
-            out_of_plane: name of the third of four components.
+            axisymmetric: whether the third of four components of a symmetric tensor is that of the hoop.
         """
         width = values.shape[1] if values.ndim == 2 else 1
-        if width in _TENSOR:
-            for k, component in enumerate(_TENSOR[width]):
-                self.add_field(f"{name}_{component.format(out=out_of_plane)}", center, values[:, k], counts)
+        components = tensor_components(name, width, axisymmetric) if width != 9 else None  # XDMF has tensors of nine
+        if components:
+            for k, component in enumerate(components):
+                self.add_field(f"{name}_{component}", center, values[:, k], counts)
             return
         if values.dtype.kind == "f" or values.ndim == 2:
             values = padded(values, self._real)

@@ -8,16 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ._core import Geometry, InputError
+from .components import AXES, tensor_components
 
 if TYPE_CHECKING:
     from .mesh import Mesh
     from .particles import Particles
     from .report import Report
 
-_AXES = {2: ("x", "y"), 3: ("x", "y", "z")}
-_TENSORS = {4: ("xx", "yy", "zz", "xy"), 6: ("xx", "yy", "zz", "xy", "yz", "xz")}
-_TENSOR_OF_SECTION = ("xx", "yy", "hoop", "xy")
-"""Components in axial symmetry, where x is the radius, as files name them"""
 _KINDS = {2: "triangles", 3: "tetrahedra"}
 
 
@@ -81,20 +78,10 @@ def _columns(particles: Particles, name: str) -> dict[str, np.ndarray]:
     values = np.asarray(getattr(particles, name))
     if values.ndim == 1:
         return {name: values}
-    ends = _components(name, values.shape[1], particles.position.shape[1], particles._geometry)
+    width, dim = values.shape[1], particles.position.shape[1]
+    tensor = tensor_components(name, width, particles._geometry == Geometry.AXISYMMETRIC)
+    ends = AXES[dim] if width == dim else tensor or range(width)
     return {f"{name}_{end}": values[:, k] for k, end in enumerate(ends)}
-
-
-def _components(name: str, width: int, dim: int, geometry: Geometry) -> Sequence[str]:
-    """Names of the components of a field with several."""
-    axes = _AXES[dim]
-    if width == dim:
-        return axes
-    if name.endswith("_gradient") and width == dim**2:
-        return [f"{of}{along}" for of in axes for along in axes]
-    if geometry == Geometry.AXISYMMETRIC and width == len(_TENSOR_OF_SECTION):
-        return _TENSOR_OF_SECTION
-    return _TENSORS.get(width, [str(k) for k in range(width)])
 
 
 def _units(particles: Particles) -> dict[str, str]:

@@ -1,10 +1,12 @@
 """How a notebook shows meshes, models and reports; particles for pandas, meshio and matplotlib."""
 
+import h5py
 import matplotlib
 import meshio
 import numpy as np
 import pytest
 from core_cases import box
+from mpm_core.output import ModelOutput
 
 import mpm_core as mpm
 
@@ -85,6 +87,10 @@ def test_components_of_tensors_have_their_names(model, tmp_path):
     assert table.iloc[0].to_dict() == {
         "velocity_gradient_xx": 0.0, "velocity_gradient_xy": 3.0, "velocity_gradient_yx": 5.0, "velocity_gradient_yy": 0.0
     }  # fmt: skip
+    with ModelOutput(model, tmp_path / "particles", particle_fields=["velocity_gradient"]) as output:
+        output.write()
+    with h5py.File(tmp_path / "particles/000000.h5") as file:
+        assert file["velocity_gradient_xy"][0] == 3.0 and file["velocity_gradient_yx"][0] == 5.0
     revolved = mpm.Model(box((2, 2)), model.laws[0], geometry=mpm.Geometry.AXISYMMETRIC)
     revolved.seed(density=1.0, per_cell=3)
     stresses = ["stress_xx", "stress_yy", "stress_hoop", "stress_xy"]
