@@ -16,12 +16,13 @@ from mpm_core.setup_warnings import UNIT_WEIGHTS, is_unit_weight
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree
+from fenics_bridge.errors import agree, real_numbers
 from fenics_bridge.fem.fields import assembled
 from fenics_bridge.fem.geometry import weighted
 from fenics_bridge.mesh.names import by_number, label, tag_numbers
 from fenics_bridge.mesh.tagged import numbered_anew
 from fenics_bridge.types import MeshTags
+from mpm_core import checks
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ def _is_finite(value: Any, scalar: bool) -> bool:
 
 
 def _arrays(tractions: Any) -> Any:
-    return {tag: np.asarray(vector, dtype=float) for tag, vector in tractions.items()}
+    return {tag: checks.real_numbers("traction", vector) for tag, vector in tractions.items()}
 
 
 def warn_of_weight(comm: MPI.Comm, load: Load) -> None:
@@ -203,7 +204,7 @@ class LoadVectors:
         for tag, pressure in load.pressure.items():
             forces = forces + pressure * self._unit_pressure(tag)
         for tag, traction in load.traction.items():
-            for component, unit in zip(self._vector(traction), self._unit_tractions(tag)):
+            for component, unit in zip(_vector(self._space.mesh, traction), self._unit_tractions(tag)):
                 forces = forces + component * unit
         return forces + self.constant + load.held * self.held
 
@@ -228,7 +229,7 @@ class LoadVectors:
         pressure = by_number(comm, self._facet_tags, load.pressure, "pressure")
         traction = by_number(comm, self._facet_tags, load.traction, "traction")
         for vector in traction.values():
-            self._vector(vector)
+            _vector(self._space.mesh, vector)
         return replace(load, unit_weight=weight, pressure=pressure, traction=traction)
 
     def require_acting(self, load: Load, before: Load) -> None:
@@ -251,12 +252,6 @@ class LoadVectors:
                 force = comm.allreduce(float(np.abs(unit(tag)).max(initial=0.0)), MPI.MAX)
                 text = f"{name}: no facet with the tag {label(self._facet_tags, tag)} is on the surface of the soil, expected one there"
                 agree(comm, text if force <= 1e-12 * self._size else None)
-
-    def _vector(self, traction: Any) -> Any:
-        vector, domain = np.asarray(traction, dtype=float), self._space.mesh
-        dim = domain.geometry.dim
-        agree(domain.comm, None if vector.shape == (dim,) else f"traction has shape {vector.shape}, expected ({dim},)")
-        return vector
 
     def _unit_weight(self, dx: Any) -> Any:
         domain, dim = self._space.mesh, self._space.mesh.geometry.dim
@@ -319,7 +314,7 @@ def elastic_load(
         radius: radius of an axisymmetric body, a UFL expression; the work is then that of one radian.
 
     Raises:
-        InputError: a facet tag does not exist. Raised on all ranks alike.
+        InputError: a facet tag does not exist, or a traction is not D finite numbers. Raised on all ranks alike.
 
     Note:
         Collective.
@@ -334,5 +329,13 @@ def elastic_load(
     for tag, value in traction.items():
         ds = ufl.Measure("ds", domain=domain, subdomain_data=facet_tags)
         numbers = tag_numbers(domain.comm, facet_tags, tag, "traction")
-        work += weighted(ufl.inner(fem.Constant(domain, np.array(value, dtype=float)), test), radius) * ds(numbers)
+        work += weighted(ufl.inner(fem.Constant(domain, _vector(domain, value)), test), radius) * ds(numbers)
     return work
+
+
+def _vector(domain: Mesh, traction: ArrayLike) -> NDArray[np.float64]:
+    """A traction (D,) [Pa]. Collective."""
+    vector, dim = real_numbers(domain.comm, "traction", traction), domain.geometry.dim
+    good = vector.shape == (dim,) and bool(np.isfinite(vector).all())
+    agree(domain.comm, None if good else f"traction is {traction!r}, expected {dim} finite numbers")
+    return vector

@@ -24,7 +24,7 @@ from mpm_core.water_checks import LABORATORY_GRAVITY
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree, is_finite, require_mesh
+from fenics_bridge.errors import agree, is_finite, real_numbers, require_mesh
 from fenics_bridge.types import MeshTags, OfPosition
 from fenics_bridge.views import body_text
 from fenics_bridge.water.applied import AppliedBoundary
@@ -136,7 +136,7 @@ class Seepage:
         if self._loading is None:
             return
         points = self._load.function_space.tabulate_dof_coordinates()[:, : self._dim]
-        load = np.broadcast_to(np.asarray(self._loading(points, self.time), dtype=float), len(points))
+        load = np.broadcast_to(real_numbers(self.domain.comm, "loading", self._loading(points, self.time)), len(points))
         agree(self.domain.comm, None if np.all(np.isfinite(load)) else "loading gives values that are not finite")
         self._load.x.array[:] = load
 

@@ -39,7 +39,7 @@ def real_numbers(name: str, values: Any) -> NDArray[np.float64]:
         is_real = False
     if not is_real:
         raise InputError(f"{name} is {_shown(values)}, expected real numbers")
-    return array.astype(np.float64)
+    return array.astype(np.float64, order="C")
 
 
 def _shown(value: Any) -> str:

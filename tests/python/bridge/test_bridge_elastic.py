@@ -7,6 +7,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import fenics_bridge as bridge
+from mpm_core import InputError
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -157,3 +158,10 @@ def test_everything_runs_on_a_mesh_that_dolfinx_made():
     solution = bridge.solve_elastic(domain, facet_tags, [bridge.fixed(1)], YOUNG, 0.0, UNIT_WEIGHT, degree=2)
     exact = -UNIT_WEIGHT / (2 * YOUNG)
     assert solution.evaluate_at(np.array([[0.5, 1.0]]))["displacement"][0, 1] == pytest.approx(exact)
+
+
+@pytest.mark.parametrize("traction", [("1", "2"), (1.0,), (0.0, np.nan)], ids=["text", "too short", "not finite"])
+def test_wrong_tractions_are_named(traction):
+    domain, facet_tags, supports, _ = column(2)
+    with pytest.raises(InputError, match="traction is .*expected"):
+        bridge.solve_elastic(domain, facet_tags, supports, YOUNG, POISSON, 0.0, traction={bridge.CREST: traction})
