@@ -1,9 +1,10 @@
-"""Forms whose compilation a killed run has broken off: the file that it left is named, and after some time it is removed."""
+"""The cache of forms: what a killed run leaves there is named and removed in time, and forms of other values are found there."""
 
 import os
 import subprocess
 import sys
 import time
+from inspect import signature
 
 import pytest
 import ufl
@@ -15,11 +16,13 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge.forms import ABANDONED
 
+JIT_OPTIONS = next(name for name in signature(fem.form).parameters if name.startswith("jit_"))  # by version of DOLFINx
+
 
 def area(cache):
     """Area of a square by a form that is compiled in a cache of its own."""
     domain = create_unit_square(MPI.COMM_SELF, 1, 1)
-    form = fem.form(fem.Constant(domain, 1.0) * ufl.dx, jit_params={"cache_dir": cache, "timeout": 1})
+    form = fem.form(fem.Constant(domain, 1.0) * ufl.dx, **{JIT_OPTIONS: {"cache_dir": cache, "timeout": 1}})
     return fem.assemble_scalar(form)
 
 
