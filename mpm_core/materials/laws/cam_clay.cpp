@@ -1,24 +1,13 @@
 #include "materials/laws/cam_clay.h"
 
-#include "materials/tools/deviator.h"
 #include "materials/tools/elasticity.h"
 #include "materials/tools/root.h"
-
-#include <numbers>
+#include "materials/tools/secant.h"
 
 namespace mpm::materials
 {
 namespace
 {
-/// (exp(y) - 1) / y
-double mean_growth(double y) { return std::abs(y) < 1e-8 ? 1 + y / 2 : std::expm1(y) / y; }
-
-/// Its derivative
-double mean_growth_slope(double y)
-{
-  return std::abs(y) < 1e-3 ? 0.5 + y / 3 + y * y / 8 : (std::exp(y) - mean_growth(y)) / y;
-}
-
 /// A point at the start of an increment: pressures and volumetric strains are positive in compression here
 template <int D>
 struct Start
@@ -40,14 +29,12 @@ struct Result
   double x, multiplier;
   double y; ///< ln of the growth of the pressure
   double pressure, preconsolidation;
-  double shear;       ///< secant shear modulus
-  double ratio;       ///< of the deviator to that of the trial
-  SymTensor<D> trial; ///< trial deviator
-  double trial_q;     ///< its sqrt(3 J2)
+  SecantTrial<D> trial;
+  double ratio; ///< of the deviator to that of the trial
 
   double yield(double slope_squared) const
   {
-    const double q = ratio * trial_q;
+    const double q = ratio * trial.q;
     return q * q / slope_squared + pressure * (pressure - preconsolidation);
   }
 };
@@ -61,11 +48,8 @@ Result<D> result_of(const Start<D>& a, double x, double multiplier)
   r.y = a.elastic * (a.volumetric - x);
   r.pressure = a.pressure * std::exp(r.y);
   r.preconsolidation = a.preconsolidation * std::exp(a.plastic * x);
-  r.shear = a.shear_ratio * a.elastic * a.pressure * mean_growth(r.y);
-  for (std::size_t k = 0; k < n_stress<D>; ++k)
-    r.trial[k] = a.deviator[k] + 2 * r.shear * a.strain[k];
-  r.trial_q = std::numbers::sqrt3 * radius<D>(r.trial);
-  r.ratio = 1 / (1 + 6 * r.shear * multiplier / a.slope_squared);
+  r.trial = secant_trial<D>(a.shear_ratio * a.elastic * a.pressure * mean_growth(r.y), a.deviator, a.strain);
+  r.ratio = 1 / (1 + 6 * r.trial.shear * multiplier / a.slope_squared);
   return r;
 }
 
@@ -101,32 +85,24 @@ Result<D> returned(const Start<D>& a)
   return at(root_between([&](double s) { return excess(at(s)); }, start, {1, -1}));
 }
 
-/// Derivatives of a result by the volumetric strain (compression positive) and by q of the trial at a fixed modulus
-struct Slopes
-{
-  double pressure, shear, ratio;
-};
-
+/// Derivatives of a result
 /// @param volumetric, trial_q  change of the volumetric strain, and of q of the trial at a fixed shear modulus
 template <int D>
-Slopes slopes(const Start<D>& a, const Result<D>& r, bool plastic, double volumetric, double trial_q)
+SecantSlopes slopes(const Start<D>& a, const Result<D>& r, bool plastic, double volumetric, double trial_q)
 {
   const double shear_by_y = a.shear_ratio * a.elastic * a.pressure * mean_growth_slope(r.y);
   double dx = 0, dm = 0, ratio_by_y = 0, ratio_by_m = 0;
   if (plastic)
   {
     const double m = r.multiplier, p = r.pressure, pc = r.preconsolidation, m2 = a.slope_squared;
-    double work = 0; // trial deviator : strain, a full contraction
-    for (std::size_t k = 0; k < n_stress<D>; ++k)
-      work += (k < 3 ? 1 : 2) * r.trial[k] * a.strain[k];
-    const double q_by_y = r.trial_q > 0 ? 3 * work * shear_by_y / r.trial_q : 0.0;
+    const double q_by_y = q_by_shear<D>(r.trial, a.strain) * shear_by_y;
     ratio_by_y = -r.ratio * r.ratio * 6 * m * shear_by_y / m2;
-    ratio_by_m = -r.ratio * r.ratio * 6 * r.shear / m2;
-    const double per_q = 2 * r.ratio * r.trial_q / m2;
-    const double by_y = per_q * (r.ratio * q_by_y + r.trial_q * ratio_by_y) + (2 * p - pc) * p;
+    ratio_by_m = -r.ratio * r.ratio * 6 * r.trial.shear / m2;
+    const double per_q = 2 * r.ratio * r.trial.q / m2;
+    const double by_y = per_q * (r.ratio * q_by_y + r.trial.q * ratio_by_y) + (2 * p - pc) * p;
     // The two equations, x = m (2 p - p_c) and yield = 0, linearised in x and m
     const double a11 = 1 + m * (2 * p * a.elastic + pc * a.plastic), a12 = -(2 * p - pc);
-    const double a21 = -p * pc * a.plastic - by_y * a.elastic, a22 = per_q * r.trial_q * ratio_by_m;
+    const double a21 = -p * pc * a.plastic - by_y * a.elastic, a22 = per_q * r.trial.q * ratio_by_m;
     const double b1 = 2 * m * p * a.elastic * volumetric;
     const double b2 = -by_y * a.elastic * volumetric - per_q * r.ratio * trial_q;
     const double determinant = a11 * a22 - a12 * a21;
@@ -135,23 +111,6 @@ Slopes slopes(const Start<D>& a, const Result<D>& r, bool plastic, double volume
   }
   const double dy = a.elastic * (volumetric - dx);
   return {r.pressure * dy, shear_by_y * dy, ratio_by_y * dy + ratio_by_m * dm};
-}
-
-template <int D>
-void write_tangent(const Start<D>& a, const Result<D>& r, bool plastic, double* tangent)
-{
-  constexpr std::size_t n = n_stress<D>;
-  const Slopes by_volume = slopes(a, r, plastic, 1, 0), by_q = slopes(a, r, plastic, 0, 1);
-  const double q_by_strain = r.trial_q > 0 ? 3 * r.shear / r.trial_q : 0.0;
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = 0; j < n; ++j)
-    {
-      const double volume = j < 3 ? -1.0 : 0.0, q = q_by_strain * r.trial[j];
-      const auto total = [&](double Slopes::*s) { return by_volume.*s * volume + by_q.*s * q; };
-      const double projected = (i == j ? (i < 3 ? 1.0 : 0.5) : 0.0) - (i < 3 && j < 3 ? 1.0 / 3 : 0.0);
-      tangent[i * n + j] = 2 * r.ratio * (r.shear * projected + a.strain[i] * total(&Slopes::shear)) +
-                           r.trial[i] * total(&Slopes::ratio) - (i < 3 ? total(&Slopes::pressure) : 0.0);
-    }
 }
 
 template <int D>
@@ -179,7 +138,7 @@ Start<D> start_of(const CamClay& law, const PointBatch<D>& points, Index i)
 template <int D>
 bool is_sound(const Start<D>& a, const Result<D>& trial)
 {
-  return a.pressure > 0 && is_usable<D>(trial.trial) && std::isfinite(trial.pressure * trial.pressure) &&
+  return a.pressure > 0 && is_usable<D>(trial.trial.deviator) && std::isfinite(trial.pressure * trial.pressure) &&
          std::isfinite(a.preconsolidation * a.preconsolidation) && a.preconsolidation > 0 && std::abs(a.volumetric) < 1;
 }
 
@@ -187,8 +146,8 @@ template <int D>
 void write_point(const CamClay& law, const Start<D>& a, const Result<D>& r, const PointBatch<D>& points, Index i)
 {
   for (std::size_t k = 0; k < n_stress<D>; ++k)
-    points.stress[k][i] = r.ratio * r.trial[k] + (k < 3 ? law.attraction - r.pressure : 0.0);
-  points.state[0][i] += 2 * r.multiplier * r.ratio * r.trial_q / a.slope_squared;
+    points.stress[k][i] = r.ratio * r.trial.deviator[k] + (k < 3 ? law.attraction - r.pressure : 0.0);
+  points.state[0][i] += 2 * r.multiplier * r.ratio * r.trial.q / a.slope_squared;
   points.state[1][i] += a.plastic * r.x;
   points.state[2][i] -= a.volumetric;
 }
@@ -229,7 +188,8 @@ BatchReport update(const CamClay& law, const PointBatch<D>& points)
     report.plastic += plastic ? 1 : 0;
     write_point(law, a, result, points, i);
     if (tangent)
-      write_tangent(a, result, plastic, tangent);
+      write_secant_tangent<D>(result.trial, a.strain, result.ratio, slopes(a, result, plastic, 1, 0),
+                              slopes(a, result, plastic, 0, 1), tangent);
   }
   return report;
 }

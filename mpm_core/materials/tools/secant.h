@@ -1,0 +1,80 @@
+#pragma once
+/// @file
+/// Elasticity with moduli in proportion to the pressure, by their secants over an increment: what its laws share.
+/// Source: Borja (1991), CMAME 92, 343-353.
+
+#include "materials/tools/deviator.h"
+
+#include <cmath>
+
+namespace mpm::materials
+{
+/// (exp(y) - 1) / y: the secant modulus over that of the start, where y is ln of the growth of the pressure
+inline double mean_growth(double y) { return std::abs(y) < 1e-8 ? 1 + y / 2 : std::expm1(y) / y; }
+
+/// Its derivative
+inline double mean_growth_slope(double y)
+{
+  return std::abs(y) < 1e-3 ? 0.5 + y / 3 + y * y / 8 : (std::exp(y) - mean_growth(y)) / y;
+}
+
+/// A trial deviator s + 2 G e and its q = sqrt(3 J2), where the secant modulus G depends on the end of the increment
+template <int D>
+struct SecantTrial
+{
+  double shear;          ///< G
+  SymTensor<D> deviator; ///< s + 2 G e
+  double q;              ///< sqrt(3 J2) of it
+};
+
+/// @param stress  deviator at the start of the increment
+/// @param strain  deviator of the strain increment, tensor components
+template <int D>
+SecantTrial<D> secant_trial(double shear, const SymTensor<D>& stress, const SymTensor<D>& strain)
+{
+  SecantTrial<D> trial{shear, stress, 0};
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+    trial.deviator[k] += 2 * shear * strain[k];
+  trial.q = std::sqrt(3.0) * radius<D>(trial.deviator);
+  return trial;
+}
+
+/// Derivative of q of the trial by G
+template <int D>
+double q_by_shear(const SecantTrial<D>& trial, const SymTensor<D>& strain)
+{
+  double work = 0; // trial deviator : strain, a full contraction
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+    work += (k < 3 ? 1 : 2) * trial.deviator[k] * strain[k];
+  return trial.q > 0 ? 3 * work / trial.q : 0.0;
+}
+
+/// Derivatives of a new stress -p 1 + r s, with the trial deviator s and pressures positive in compression
+struct SecantSlopes
+{
+  double pressure; ///< of p
+  double shear;    ///< of G
+  double ratio;    ///< of r
+};
+
+/// Writes the tangent of -p 1 + r s.
+/// @param by_volume  derivatives by the volumetric strain, positive in compression
+/// @param by_q       derivatives by q of the trial at a fixed shear modulus
+template <int D>
+void write_secant_tangent(const SecantTrial<D>& trial, const SymTensor<D>& strain, double ratio,
+                          const SecantSlopes& by_volume, const SecantSlopes& by_q, double* tangent)
+{
+  constexpr std::size_t n = n_stress<D>;
+  const double q_by_strain = trial.q > 0 ? 3 * trial.shear / trial.q : 0.0;
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j)
+    {
+      const double volume = j < 3 ? -1.0 : 0.0, q = q_by_strain * trial.deviator[j];
+      const auto total = [&](double SecantSlopes::*s) { return by_volume.*s * volume + by_q.*s * q; };
+      const double projected = (i == j ? (i < 3 ? 1.0 : 0.5) : 0.0) - (i < 3 && j < 3 ? 1.0 / 3 : 0.0);
+      tangent[i * n + j] = 2 * ratio * (trial.shear * projected + strain[i] * total(&SecantSlopes::shear)) +
+                           trial.deviator[i] * total(&SecantSlopes::ratio) -
+                           (i < 3 ? total(&SecantSlopes::pressure) : 0.0);
+    }
+}
+} // namespace mpm::materials
