@@ -26,6 +26,26 @@ end without overstress.)")
       R"(The state variable log_preconsolidation is the logarithm of the preconsolidation pressure over its initial
 value, attraction included in both; set it for points with another initial value. The time step follows from the
 modulus at twice the preconsolidation pressure.)");
+  bind_law<NorSand>(m, "NorSand",
+                    "NorSand: a critical state law for sand, silt and tailings, loose (static liquefaction) or dense.",
+                    R"(With p = attraction - mean stress, q = sqrt(3 J2), void ratio e and image pressure p_i:
+
+- critical state: q = M p and e = e_c(p) = critical_void_ratio - critical_compression ln(p / 1 kPa);
+- state parameter: psi_i = e - e_c(p_i);
+- yield surface: q = M_i p (1 + ln(p_i / p)) with M_i = M - coupling dilatancy abs(psi_i), at least M / 2;
+- associated flow: de_v / de_q = M_i - q / p;
+- hardening: dp_i / p_i = hardening (p_max / p_i - 1) de_q, with p_max = p exp(-dilatancy psi_i / M_i), but at least
+  0.37 p; dense sand therefore dilates at the rate dilatancy psi_i at most; under isotropic compression, where q = 0, by de_v / M_i for de_q;
+- elasticity: G = rigidity p, and a constant Poisson's ratio.
+
+The surface is round: M is that of triaxial compression, and holds in all other directions too. The state variables
+log_image_pressure and log_specific_volume are the logarithms of p_i (attraction included) and of 1 + e over their
+initial values; nor_sand_state gives them for points that begin with a stress and a state parameter. Soil that loosens
+keeps a pressure of a millionth of 1 kPa plus the attraction. Increments are implicit, of first order: of some 1e-3 for
+errors of a few per cent. The time step follows from the modulus at twice the largest pressure within the yield
+surface. Without the softening by rotation of principal stresses and by unloading of later versions.
+
+Source: Jefferies (1993), Geotechnique 43, 91-103; Jefferies, Been (2016), Soil Liquefaction, 2nd ed.)");
 }
 
 void bind_softening(py::module_& m)

@@ -8,6 +8,7 @@
 #include "materials/laws/external_law.h"
 #include "materials/laws/linear_elastic.h"
 #include "materials/laws/mohr_coulomb.h"
+#include "materials/laws/nor_sand.h"
 #include "materials/laws/softening_mohr_coulomb.h"
 #include "materials/laws/umat.h"
 #include "materials/laws/viscoplastic_mohr_coulomb.h"
@@ -20,7 +21,7 @@ namespace mpm::materials
 /// One of the laws that stand for themselves, or one of `Wrapper`, laws that are made of another one
 template <class... Wrapper>
 using LawList = std::variant<LinearElastic, MohrCoulomb, ViscoplasticMohrCoulomb, SofteningMohrCoulomb, DruckerPrager,
-                             CamClay, ExternalLaw, Umat, Wrapper...>;
+                             CamClay, NorSand, ExternalLaw, Umat, Wrapper...>;
 
 /// Throws InputError, with name, value and range, when a parameter of a law is out of its range.
 template <class L>

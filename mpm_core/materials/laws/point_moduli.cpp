@@ -32,6 +32,7 @@ struct DiffersByPoint
     return false;
   }
   bool operator()(const CamClay&) const { return true; }
+  bool operator()(const NorSand&) const { return true; }
   bool operator()(const Heterogeneous& law) const
   {
     const auto is_elastic = [](const std::string& name)
@@ -57,6 +58,11 @@ struct ModuliOfPoint
     const double least = 1e-6 * (law.preconsolidation + law.attraction); // a point without pressure has no stiffness
     const double pressure = std::max(law.attraction - mean_stress, least);
     return moduli_of_bulk(bulk_per_pressure(law, state[2]) * pressure, law.poisson);
+  }
+  WaveModuli operator()(const NorSand& law) const
+  {
+    const double least = 1e-6 * (law.reference_pressure + law.attraction); // which its points keep
+    return moduli_of_bulk(bulk_per_pressure(law) * std::max(law.attraction - mean_stress, least), law.poisson);
   }
   WaveModuli operator()(const Heterogeneous& law) const { return std::visit(*this, own_law(law, state)); }
   WaveModuli operator()(const Hencky& law) const
@@ -87,6 +93,12 @@ struct LimitingModulus
     const double preconsolidation = (law.preconsolidation + law.attraction) * std::exp(state[1]);
     return moduli_of_bulk(bulk_per_pressure(law, state[2]) * (2 * preconsolidation - law.attraction), law.poisson)
         .p_wave;
+  }
+  double operator()(const NorSand& law) const
+  {
+    NorSand now = law;
+    now.image_pressure = (law.image_pressure + law.attraction) * std::exp(state[1]) - law.attraction;
+    return p_wave_modulus(now);
   }
   double operator()(const Heterogeneous& law) const { return std::visit(*this, law.law); }
   double operator()(const Hencky& law) const { return std::visit(*this, law.law); }

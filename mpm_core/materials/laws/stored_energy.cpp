@@ -47,15 +47,30 @@ double energy(const ViscoplasticMohrCoulomb& law, const SymTensor<D>& stress, co
   return energy<D>(law.inviscid, stress, state);
 }
 
+/// With moduli in proportion to the pressure: along the swelling line, then at constant pressure
+/// @param bulk        bulk modulus over the pressure [-]
+/// @param attraction  [Pa], where the pressure is zero
+template <int D>
+double energy_by_pressure(double bulk, double poisson, double attraction, const SymTensor<D>& stress)
+{
+  const auto [mean, squared] = invariants<D>(stress);
+  const double pressure = attraction - mean;
+  const double shear = 1.5 * bulk * pressure * (1 - 2 * poisson) / (1 + poisson);
+  const double tension = attraction > 0 ? attraction * std::log(pressure / attraction) : 0;
+  return (pressure - attraction - tension) / bulk + squared / (4 * shear);
+}
+
 template <int D>
 double energy(const CamClay& law, const SymTensor<D>& stress, const double* state)
 {
-  const auto [mean, squared] = invariants<D>(stress);
-  const double pressure = law.attraction - mean, volume = (1 + law.void_ratio) * std::exp(state[2]);
-  const double bulk = volume * pressure / law.swelling;
-  const double shear = 1.5 * bulk * (1 - 2 * law.poisson) / (1 + law.poisson);
-  const double tension = law.attraction > 0 ? law.attraction * std::log(pressure / law.attraction) : 0;
-  return (pressure - law.attraction - tension) * law.swelling / volume + squared / (4 * shear);
+  const double bulk = (1 + law.void_ratio) * std::exp(state[2]) / law.swelling;
+  return energy_by_pressure<D>(bulk, law.poisson, law.attraction, stress);
+}
+
+template <int D>
+double energy(const NorSand& law, const SymTensor<D>& stress, const double*)
+{
+  return energy_by_pressure<D>(bulk_per_pressure(law), law.poisson, law.attraction, stress);
 }
 
 template <int D>

@@ -16,6 +16,14 @@ constexpr double degree = std::numbers::pi / 180;
 /// The angle [degrees] whose tangent is that of another one over a factor
 double divided(double angle, double factor) { return std::atan(std::tan(angle * degree) / factor) / degree; }
 
+/// The slope M in triaxial compression that goes with the tangent of its friction angle over a factor
+double divided_slope(double slope, double factor)
+{
+  const double angle = std::asin(3 * slope / (6 + slope));
+  const double sine = std::sin(std::atan(std::tan(angle) / factor));
+  return 6 * sine / (3 - sine);
+}
+
 /// The dilation that goes with a reduced friction
 double limited(double dilation, double friction_before, double friction)
 {
@@ -143,10 +151,15 @@ Undrained reduced_strength(const Undrained& law, double factor)
 
 CamClay reduced_strength(const CamClay& law, double factor)
 {
-  const double angle = std::asin(3 * law.critical_slope / (6 + law.critical_slope));
-  const double sine = std::sin(std::atan(std::tan(angle) / factor));
   CamClay reduced = law;
-  reduced.critical_slope = 6 * sine / (3 - sine);
+  reduced.critical_slope = divided_slope(law.critical_slope, factor);
+  return reduced;
+}
+
+NorSand reduced_strength(const NorSand& law, double factor)
+{
+  NorSand reduced = law;
+  reduced.critical_slope = divided_slope(law.critical_slope, factor);
   return reduced;
 }
 } // namespace mpm::materials

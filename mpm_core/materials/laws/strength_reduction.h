@@ -17,6 +17,7 @@ SofteningMohrCoulomb reduced_strength(const SofteningMohrCoulomb& law, double fa
 DruckerPrager reduced_strength(const DruckerPrager& law, double factor);
 /// The friction angle of the critical state, sin(phi) = 3M / (6 + M); attraction as it is
 CamClay reduced_strength(const CamClay& law, double factor);
+NorSand reduced_strength(const NorSand& law, double factor);
 
 /// Reduces the parameters that the law names.
 /// @throws InputError it names none

@@ -16,6 +16,7 @@ from ._core import (
     LawParameter,
     LinearElastic,
     MohrCoulomb,
+    NorSand,
     PythonLaw,
     RelaxationKind,
     RunError,
@@ -39,7 +40,7 @@ from .field_contact import FieldContact
 from .ghost import GhostPenalty
 from .integration import default_integration
 from .law_parameters import signature_of
-from .laws import log_preconsolidation, matched_drucker_prager, tresca, von_mises
+from .laws import log_preconsolidation, matched_drucker_prager, nor_sand_state, tresca, von_mises
 from .mesh import Mesh
 from .model import Model
 from .motion import Motion, motion_of_acceleration, read_acceleration, read_accelerogram
@@ -87,6 +88,7 @@ __all__ = [
     "MohrCoulomb",
     "Motion",
     "Newton",
+    "NorSand",
     "Particles",
     "Plane",
     "Polyline",
@@ -119,6 +121,7 @@ __all__ = [
     "log_preconsolidation",
     "matched_drucker_prager",
     "motion_of_acceleration",
+    "nor_sand_state",
     "parts",
     "read_acceleration",
     "read_accelerogram",

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._core import CamClay, ConeMatch, DruckerPrager, InputError, MohrCoulomb, cone_slope, cone_strength
+from ._core import CamClay, ConeMatch, DruckerPrager, InputError, MohrCoulomb, NorSand, cone_slope, cone_strength
 from .checks import member, positive
 from .mesh import floats
 
@@ -83,13 +83,65 @@ def log_preconsolidation(law: CamClay, stress: ArrayLike, overconsolidation: flo
     Returns:
         Shape (n,), for ``Model.set_state("log_preconsolidation", ...)``.
     """
-    if not overconsolidation >= 1:
-        raise InputError(f"overconsolidation is {overconsolidation}, expected at least 1")
+    _check_overconsolidation(overconsolidation)
+    pressure, q = _pressure_and_q(law, stress)
+    through = pressure + q**2 / (law.critical_slope**2 * pressure)
+    return np.log(overconsolidation * through / (law.preconsolidation + law.attraction))
+
+
+def nor_sand_state(
+    law: NorSand, stress: ArrayLike, state_parameter: ArrayLike, overconsolidation: float = 1.0
+) -> dict[str, NDArray[np.float64]]:
+    """The states of points of NorSand that begin with a stress and a state parameter.
+
+    The image pressure is that of the yield surface through the stress, times the overconsolidation; the void ratio is the
+    critical one at the pressure of the stress plus the state parameter.
+
+    Args:
+        law: the sand.
+        stress: effective stress [Pa], tension positive, shape (n, 4) or (n, 6); its mean must be below the attraction.
+        state_parameter: psi, void ratio less that of the critical state line at the same pressure [-], a number or shape (n,):
+            positive for loose soil, negative for dense.
+        overconsolidation: image pressure over that of the yield surface through the stress [-], at least 1.
+
+    Returns:
+        `log_image_pressure` and `log_specific_volume`, shape (n,) each, for ``Model.set_state(name, values)``.
+
+    Raises:
+        InputError: overconsolidation below 1, a stress without pressure, or a state parameter without a positive void ratio.
+    """
+    _check_overconsolidation(overconsolidation)
+    pressure, q = _pressure_and_q(law, stress)
+    psi = np.broadcast_to(np.asarray(state_parameter, dtype=float), pressure.shape)
+    void_ratio = law.critical_void_ratio - law.critical_compression * np.log(pressure / 1e3) + psi
+    wrong = ~(void_ratio > 0)
+    if wrong.any():
+        raise InputError(
+            f"state_parameter is {psi[wrong][0]:g} at {pressure[wrong][0]:g} Pa, where the void ratio would be "
+            f"{void_ratio[wrong][0]:g}, expected a positive one"
+        )
+    fall, log_image = law.coupling * law.dilatancy, np.zeros_like(pressure)
+    for _ in range(100):  # q = M_i p (1 + ln(p_i / p)), where M_i depends a little on p_i
+        slope = law.critical_slope - fall * np.abs(psi + law.critical_compression * log_image)
+        log_image = q / (pressure * np.maximum(slope, law.critical_slope / 2)) - 1
+    image = overconsolidation * pressure * np.exp(log_image)
+    return {
+        "log_image_pressure": np.log(image / (law.image_pressure + law.attraction)),
+        "log_specific_volume": np.log((1 + void_ratio) / (1 + law.void_ratio)),
+    }
+
+
+def _check_overconsolidation(ratio: float) -> None:
+    if not ratio >= 1:
+        raise InputError(f"overconsolidation is {ratio}, expected at least 1")
+
+
+def _pressure_and_q(law: CamClay | NorSand, stress: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Pressure from the attraction on and sqrt(3 J2) [Pa] of stresses that must have pressure."""
     s = floats("stress", stress, (None, None))
     mean = s[:, :3].mean(axis=1)
     pressure = law.attraction - mean
     if (pressure <= 0).any():
         raise InputError(f"stress has the mean {mean.max():g} Pa, expected below the attraction, {law.attraction:g} Pa")
     squares = ((s[:, :3] - mean[:, None]) ** 2).sum(axis=1) + 2 * (s[:, 3:] ** 2).sum(axis=1)
-    through = pressure + 1.5 * squares / (law.critical_slope**2 * pressure)
-    return np.log(overconsolidation * through / (law.preconsolidation + law.attraction))
+    return pressure, np.sqrt(1.5 * squares)

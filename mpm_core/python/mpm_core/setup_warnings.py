@@ -51,7 +51,7 @@ def warn_of_setup(model: Model, nmd: bool, damping: float = 0.0) -> None:
     """Warn of probable mistakes in the input, and of local damping where it does not suit the model. Collective."""
     locks = "" if nmd else locking(model.laws)
     of_loads = _nothing_acts(model), _nothing_holds(model), _upwards(model), _weight(model) or _softness(model)
-    of_laws = angles_in_radians(model.laws), _beyond_preconsolidation(model), locks
+    of_laws = angles_in_radians(model.laws), *(_outside_of_surface(model, kind) for kind in SURFACES), locks
     of_sides = (
         *_held_sides(model),
         *_cut_motion(model),
@@ -227,14 +227,27 @@ def _softness(model: Model) -> str:
     )
 
 
-def _beyond_preconsolidation(model: Model) -> str:
-    """Of clay that has never been loaded as the stresses say that it is, before the first step, which would reduce them."""
+SURFACES = {
+    _core.CamClay: (
+        "lie beyond their preconsolidation pressure; the first step reduces them to it. Set it by "
+        'model.set_state("log_preconsolidation", mpm.log_preconsolidation(law, stress, overconsolidation))'
+    ),
+    _core.NorSand: (
+        "lie outside of the yield surface of their image pressure; the first step returns them to it. Set it, and the void ratio, by "
+        "model.set_state(name, values) for name, values in mpm.nor_sand_state(law, stress, state_parameter).items()"
+    ),
+}
+"""What a warning says of stresses outside of the yield surface that a law has at the start, and how to set it"""
+
+
+def _outside_of_surface(model: Model, kind: Any) -> str:
+    """Of soil that has never been loaded as the stresses say that it is, before the first step, which would change them."""
     if model.steps > 0:
         return ""
     p, outside, total = model.particles, 0, 0
     for number, law in enumerate(model.laws):
         rows = p.material == number
-        if not (rows.any() and any(isinstance(each, _core.CamClay) for each in with_inner_laws(law))):
+        if not (rows.any() and any(isinstance(each, kind) for each in with_inner_laws(law))):
             continue
         stress = p.stress[rows]
         returned = stress.copy()
@@ -245,10 +258,7 @@ def _beyond_preconsolidation(model: Model) -> str:
     outside, total = model.comm.allreduce(np.array([outside, total]))
     if not outside:
         return ""
-    return (
-        f"stresses of {outside / total:.1%} of the particles of CamClay lie beyond their preconsolidation pressure; the first step reduces "
-        'them to it. Set it by model.set_state("log_preconsolidation", mpm.log_preconsolidation(law, stress, overconsolidation))'
-    )
+    return f"stresses of {outside / total:.1%} of the particles of {kind.__name__} {SURFACES[kind]}"
 
 
 def angles_in_radians(laws: Iterable[Any]) -> str:

@@ -68,14 +68,24 @@ def test_drucker_prager_fails_at_the_divided_stress():
     assert weak == pytest.approx(strong / 1.6, rel=1e-3)
 
 
-def test_cam_clay_has_the_friction_angle_of_its_critical_state_reduced():
-    law = mpm.CamClay(
+CRITICAL_STATE_LAWS = [
+    mpm.CamClay(
         compression=0.2, swelling=0.04, critical_slope=1.2, poisson=0.3, preconsolidation=100e3, void_ratio=1.0
-    )
+    ),
+    mpm.NorSand(
+        critical_void_ratio=0.9, critical_compression=0.03, critical_slope=1.2, dilatancy=4.0, hardening=100.0, rigidity=200.0,
+        poisson=0.2, void_ratio=0.8, image_pressure=100e3,
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("law", CRITICAL_STATE_LAWS)
+def test_the_friction_angle_of_the_critical_state_is_reduced(law):
     weak = bridge.reduced_strength(law, 1.5)
     sines = [3 * one.critical_slope / (6 + one.critical_slope) for one in (law, weak)]
     assert np.tan(np.arcsin(sines[1])) == pytest.approx(np.tan(np.arcsin(sines[0])) / 1.5)
-    assert weak.preconsolidation == law.preconsolidation and weak.compression == law.compression
+    for name in (p.name for p in law.parameters if p.name != "critical_slope"):
+        assert getattr(weak, name) == getattr(law, name)
 
 
 def test_laws_made_of_others():

@@ -155,6 +155,8 @@ LOAM = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e3, friction_angl
         ([mpm.SofteningMohrCoulomb(LOAM, residual_cohesion=0.0, residual_friction_angle=20.0, softening_strain=0.1,
                                    reference_length=0.1)], True),
         ([SAND], False),
+        ([mpm.NorSand(critical_void_ratio=0.9, critical_compression=0.03, critical_slope=1.25, dilatancy=4.0, hardening=100.0,
+                      rigidity=200.0, poisson=0.2, void_ratio=0.8, image_pressure=100e3)], False),
         ([SAND, CLAY], False),
         ([mpm.DruckerPrager(young=YOUNG, poisson=POISSON, strength=0.0, friction=0.5)], False),
         ([ELASTIC], False),

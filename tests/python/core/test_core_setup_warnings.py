@@ -184,19 +184,38 @@ def test_local_damping_where_a_motion_enters_is_warned_of(let_in):
     assert shaken(free, let_in=let_in, rayleigh=mpm.Rayleigh(mass=1.0)) == []
 
 
-@pytest.mark.parametrize(
-    "wrapped", [lambda law: law, mpm.Hencky, lambda law: mpm.Undrained(law, water_modulus=1e7, porosity=0.5)]
-)
+WRAPPERS = [lambda law: law, mpm.Hencky, lambda law: mpm.Undrained(law, water_modulus=1e7, porosity=0.5)]
+
+
+def stresses_after_the_first_step(law, pressure, state, value):
+    """(warnings of stresses outside of the yield surface, fraction of the total stress that is left) of soil without strain."""
+    model = model_of(law, gravity=0.0)
+    model.particles.set("stress", np.tile([-pressure] * 3 + [0.0], (len(model.particles), 1)))
+    model.set_state(state, np.full(len(model.particles), value))
+    words = "100.0% of the particles of"
+    return [text for text in said(model) if words in text], model.particles.stress[:, 1].mean() / -pressure
+
+
+@pytest.mark.parametrize("wrapped", WRAPPERS)
 @pytest.mark.parametrize("pressure, known, warned", [(99e3, 1.0, False), (300e3, 3.0, False), (300e3, 1.0, True)])
 def test_clay_with_stresses_beyond_its_preconsolidation_is_warned_of(wrapped, pressure, known, warned):
     # A preconsolidation pressure of 100 kPa, or of `known` times that: an isotropic pressure beyond it cannot be carried.
     clay = mpm.CamClay(
         compression=0.2, swelling=0.04, critical_slope=1.0, poisson=0.25, preconsolidation=100e3, void_ratio=1.0
     )
-    model = model_of(wrapped(clay), gravity=0.0)
-    model.particles.set("stress", np.tile([-pressure] * 3 + [0.0], (len(model.particles), 1)))
-    model.set_state("log_preconsolidation", np.full(len(model.particles), np.log(known)))
-    warnings_found = [text for text in said(model) if "100.0% of the particles of CamClay lie beyond" in text]
-    assert bool(warnings_found) == warned
-    kept = model.particles.stress[:, 1].mean() / -pressure  # of the total stress; without strain, but for the return
-    assert warned == (kept < 0.99)
+    found, kept = stresses_after_the_first_step(wrapped(clay), pressure, "log_preconsolidation", np.log(known))
+    assert bool(found) == warned == (kept < 0.99)
+    assert all("particles of CamClay lie beyond their preconsolidation pressure" in text for text in found)
+
+
+@pytest.mark.parametrize("wrapped", WRAPPERS)
+@pytest.mark.parametrize("pressure, known, warned", [(250e3, 1.0, False), (750e3, 3.0, False), (750e3, 1.0, True)])
+def test_sand_with_stresses_outside_of_its_yield_surface_is_warned_of(wrapped, pressure, known, warned):
+    # An image pressure of 100 kPa, or of `known` times that: an isotropic pressure beyond 2.718 times it cannot be carried.
+    sand = mpm.NorSand(
+        critical_void_ratio=0.9, critical_compression=0.03, critical_slope=1.25, dilatancy=4.0, hardening=100.0, rigidity=200.0,
+        poisson=0.2, void_ratio=0.8, image_pressure=100e3,
+    )  # fmt: skip
+    found, kept = stresses_after_the_first_step(wrapped(sand), pressure, "log_image_pressure", np.log(known))
+    assert bool(found) == warned == (kept < 0.99)
+    assert all("particles of NorSand lie outside of the yield surface" in text for text in found)

@@ -16,6 +16,10 @@ SOFTENING = mpm.SofteningMohrCoulomb(
 CLAY = mpm.CamClay(
     compression=0.2, swelling=0.04, critical_slope=1.0, poisson=0.25, void_ratio=1.0, preconsolidation=60e3
 )
+SAND = mpm.NorSand(
+    critical_void_ratio=0.9, critical_compression=0.03, critical_slope=1.25, dilatancy=4.0, hardening=100.0, rigidity=200.0,
+    poisson=0.2, void_ratio=0.84, image_pressure=25e3,
+)  # fmt: skip
 LAWS = {
     "elastic": mpm.LinearElastic(**ELASTIC),
     "Mohr-Coulomb": SOIL,
@@ -26,6 +30,8 @@ LAWS = {
     "Cam-Clay": CLAY,
     "undrained": mpm.Undrained(SOIL, water_modulus=2e8, porosity=0.4),
     "undrained Cam-Clay": mpm.Undrained(CLAY, water_modulus=2e8, porosity=0.5),
+    "NorSand": SAND,
+    "undrained NorSand": mpm.Undrained(SAND, water_modulus=2e8, porosity=0.5),
     "Hencky": mpm.Hencky(SOIL),
     "viscoplastic": mpm.ViscoplasticMohrCoulomb(
         **ELASTIC, cohesion=10e3, friction_angle=25.0, dilation_angle=5.0, viscosity=1e-6

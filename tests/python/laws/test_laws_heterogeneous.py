@@ -21,6 +21,12 @@ LAWS = {
          "void_ratio": 1.0},
         {"critical_slope": (0.8, 1.4)},
     ),
+    "NorSand": (
+        mpm.NorSand,
+        {"critical_void_ratio": 0.9, "critical_compression": 0.03, "critical_slope": 1.25, "dilatancy": 4.0, "hardening": 100.0,
+         "rigidity": 200.0, "poisson": 0.2, "void_ratio": 0.84, "image_pressure": 60e3},
+        {"critical_slope": (1.1, 1.4), "hardening": (50.0, 200.0)},
+    ),
     "elastic": (mpm.LinearElastic, ELASTIC, {"young": (1e6, 10e6)}),
 }  # fmt: skip
 

@@ -30,8 +30,12 @@ CONES = {
 CLAY = mpm.CamClay(
     compression=0.2, swelling=0.04, critical_slope=1.0, poisson=0.25, void_ratio=1.0, preconsolidation=100e3
 )
+SAND = mpm.NorSand(
+    critical_void_ratio=0.9, critical_compression=0.03, critical_slope=1.25, dilatancy=4.0, hardening=100.0, rigidity=200.0,
+    poisson=0.2, void_ratio=0.84, image_pressure=100e3,
+)  # fmt: skip
 WATER = {"water_modulus": 2e8, "porosity": 0.4}
-SKELETONS = {**PYRAMIDS, **CONES, "Cam-Clay": CLAY}
+SKELETONS = {**PYRAMIDS, **CONES, "Cam-Clay": CLAY, "NorSand": SAND}
 TESTS = ("oedometer", "drained", "undrained", "shear")
 
 

@@ -11,11 +11,17 @@ SOIL = mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=10e3, friction_angle=25
 CLAY = mpm.CamClay(
     compression=0.2, swelling=0.04, critical_slope=1.0, poisson=0.25, void_ratio=1.0, preconsolidation=100e3
 )
+SAND = mpm.NorSand(
+    critical_void_ratio=0.9, critical_compression=0.03, critical_slope=1.25, dilatancy=4.0, hardening=100.0, rigidity=200.0,
+    poisson=0.2, void_ratio=0.84, image_pressure=100e3,
+)  # fmt: skip
 WATER, POROSITY = 2e8, 0.4
 WRAPPED = {
     "undrained elastic": mpm.Undrained(mpm.LinearElastic(young=10e6, poisson=0.3), water_modulus=WATER, porosity=0.4),
     "undrained Mohr-Coulomb": mpm.Undrained(SOIL, water_modulus=WATER, porosity=POROSITY),
     "undrained Cam-Clay": mpm.Undrained(CLAY, water_modulus=WATER, porosity=0.5),
+    "undrained NorSand": mpm.Undrained(SAND, water_modulus=WATER, porosity=0.5),
+    "Hencky NorSand": mpm.Hencky(SAND),
     "Hencky": mpm.Hencky(mpm.LinearElastic(young=10e6, poisson=0.3)),
     "Hencky Mohr-Coulomb": mpm.Hencky(SOIL),
     "undrained Hencky": mpm.Undrained(mpm.Hencky(SOIL), water_modulus=WATER, porosity=POROSITY),
