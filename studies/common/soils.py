@@ -22,6 +22,7 @@ MATERIALS = (
     "von-mises",
     "drucker-prager",
     "cam-clay",
+    "nor-sand",
     "elastic",
 )
 
@@ -30,11 +31,13 @@ FRICTIONAL = ("mohr-coulomb", "viscoplastic", "softening", "drucker-prager")
 ONLY_WITH = {
     ("--viscosity",): ("viscoplastic",),
     ("--residual-cohesion", "--residual-friction-angle", "--softening-strain", "--reference-length"): ("softening",),
-    ("--compression-slope", "--swelling-slope", "--critical-slope", "--void-ratio", "--preconsolidation",
-     "--attraction"): ("cam-clay",),
+    ("--compression-slope", "--swelling-slope", "--preconsolidation"): ("cam-clay",),
+    ("--critical-slope", "--void-ratio", "--attraction"): ("cam-clay", "nor-sand"),
+    ("--critical-void-ratio", "--critical-compression", "--dilatancy", "--hardening", "--rigidity", "--image-pressure",
+     "--coupling"): ("nor-sand",),
     ("--friction-angle", "--dilation-angle", "--tension-cutoff"): FRICTIONAL,
     ("--cohesion",): (*FRICTIONAL, "tresca", "von-mises"),
-    ("--young",): tuple(name for name in MATERIALS if name != "cam-clay"),
+    ("--young",): tuple(name for name in MATERIALS if name not in ("cam-clay", "nor-sand")),
 }  # fmt: skip
 """Options that only some laws have"""
 
@@ -63,7 +66,11 @@ def add_law_options(
     for name, default, option in [("compression", 0.1, "--compression-slope"), ("swelling", 0.02, "--swelling-slope"),
                                   ("critical_slope", 1.0, None), ("void_ratio", 1.0, None),
                                   ("preconsolidation", 20e3, None), ("attraction", 1e3, None)]:  # fmt: skip
-        add_parameter(p, mpm.CamClay, name, default, "Cam-Clay: ", option)
+        shared = name in ("critical_slope", "void_ratio", "attraction")
+        add_parameter(p, mpm.CamClay, name, default, "Cam-Clay and NorSand: " if shared else "Cam-Clay: ", option)
+    for name, default in [("critical_void_ratio", 1.0), ("critical_compression", 0.03), ("dilatancy", 4.0), ("hardening", 100.0),
+                          ("rigidity", 200.0), ("image_pressure", 20e3), ("coupling", 0.2)]:  # fmt: skip
+        add_parameter(p, mpm.NorSand, name, default, "NorSand: ")
     add_switch(
         p, "--undrained", False, "undrained soil: a law of effective stresses, and pore water that does not drain"
     )
@@ -195,6 +202,13 @@ def _skeleton(a: argparse.Namespace) -> Any:
             return mpm.CamClay(
                 compression=a.compression_slope, swelling=a.swelling_slope, critical_slope=a.critical_slope, poisson=a.poisson,
                 preconsolidation=a.preconsolidation, void_ratio=a.void_ratio, attraction=a.attraction,
+            )  # fmt: skip
+        case "nor-sand":
+            return mpm.NorSand(
+                critical_void_ratio=a.critical_void_ratio, critical_compression=a.critical_compression,
+                critical_slope=a.critical_slope, dilatancy=a.dilatancy, hardening=a.hardening, rigidity=a.rigidity,
+                poisson=a.poisson, image_pressure=a.image_pressure, void_ratio=a.void_ratio, coupling=a.coupling,
+                attraction=a.attraction,
             )  # fmt: skip
         case "viscoplastic":
             return mpm.ViscoplasticMohrCoulomb(**elastic, **strength, viscosity=a.viscosity)

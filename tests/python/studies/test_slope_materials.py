@@ -21,11 +21,12 @@ import mpm_core as mpm  # noqa: E402
 slope = importlib.import_module("slope")
 
 SMALL = "--cell-size 0.25 --crest 1 --particles-per-cell 3 --nmd".split()
-WITHOUT_COHESION = {"cam-clay", "elastic", "undrained Cam-Clay"}
+WITHOUT_COHESION = {"cam-clay", "nor-sand", "undrained NorSand", "elastic", "undrained Cam-Clay"}
 OTHERS = {
     "finite strain": ["--finite-strain"],
     "undrained": ["--undrained", "--water-modulus", "1e6"],
     "undrained Cam-Clay": ["--undrained", "--material", "cam-clay"],
+    "undrained NorSand": ["--undrained", "--material", "nor-sand"],
     "Python": ["--python-law"],
     "UMAT": ["--umat"],
 }

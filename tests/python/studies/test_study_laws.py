@@ -40,6 +40,29 @@ def test_undrained_triaxial_test_of_cam_clay_ends_at_the_critical_state(tmp_path
         assert end["q_Pa"] == pytest.approx(end["p_Pa"], rel=1e-2)
 
 
+def test_undrained_triaxial_test_of_loose_nor_sand_ends_at_its_residual_strength(tmp_path):
+    # e = 0.99 at 20 kPa, above the critical 1 - 0.03 ln 20 = 0.910: p = exp((1 - e) / 0.03) kPa and q = M p, after a larger q
+    sand = [
+        "--material",
+        "nor-sand",
+        "--void-ratio",
+        "0.99",
+        "--attraction",
+        "0",
+        "--hardening",
+        "400",
+        "--critical-slope",
+        "1.2",
+    ]
+    options = ["--test", "undrained", "--strain", "1", "--steps", "2000"]
+    result = study("element_test", tmp_path, *sand, *options)
+    assert result.returncode == 0, result.stderr
+    end, history = summary(tmp_path), np.genfromtxt(tmp_path / "history.csv", delimiter=",", names=True)
+    residual = 1e3 * np.exp((1.0 - 0.99) / 0.03)
+    assert end["p_Pa"] == pytest.approx(residual, rel=0.01) and end["q_Pa"] == pytest.approx(1.2 * residual, rel=0.01)
+    assert history["q_Pa"].max() > 5 * end["q_Pa"]
+
+
 def test_viscous_soil_in_simple_shear_has_the_stress_of_its_rate(tmp_path):
     # Bingham's fluid: tau = c + viscosity times rate, once the overstress has grown over many times viscosity / G
     mud = [
