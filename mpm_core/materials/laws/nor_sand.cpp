@@ -13,27 +13,6 @@ using namespace nor_sand;
 
 constexpr double most_pressure = 1e100; ///< [Pa] beyond which squares and cubes might overflow
 
-template <int D>
-Start<D> start_of(const NorSand& law, const PointBatch<D>& points, Index i)
-{
-  SymTensor<D> stress, strain;
-  for (std::size_t k = 0; k < n_stress<D>; ++k)
-  {
-    stress[k] = points.stress[k][i];
-    strain[k] = points.strain_increment[k][i] * (k < 3 ? 1 : 0.5);
-  }
-  Start<D> a{law, bulk_per_pressure(law), 1e-6 * (law.reference_pressure + law.attraction), 0, 0, 0, 0, 0, {}, {}};
-  a.pressure = law.attraction - mean<D>(stress);
-  a.image = (law.image_pressure + law.attraction) * std::exp(points.state[1][i]);
-  a.volumetric = -3 * mean<D>(strain);
-  a.volume = (1 + law.void_ratio) * std::exp(points.state[2][i] - a.volumetric);
-  a.psi =
-      a.volume - 1 - law.critical_void_ratio + law.critical_compression * std::log(a.image / law.reference_pressure);
-  a.deviator = deviator<D>(stress);
-  a.strain = deviator<D>(strain);
-  return a;
-}
-
 /// Whether an increment can be worked with: there is pressure, and it stays a number.
 template <int D>
 bool is_sound(const Start<D>& a, const Result<D>& r)

@@ -54,8 +54,8 @@ def image_pressure(law, state):
     return (law.image_pressure + law.attraction) * np.exp(np.atleast_2d(state)[:, 1])
 
 
-def critical(p):
-    return GAMMA - LAMBDA * np.log(p / 1e3)
+def critical(p, law=SAND):
+    return law.critical_void_ratio - law.critical_compression * np.log(p / 1e3)
 
 
 def excess(law, stress, state):
@@ -63,8 +63,8 @@ def excess(law, stress, state):
     p, q = p_and_q(stress)
     p = p + law.attraction
     image = image_pressure(law, state)
-    psi = void_ratio(law, state) - critical(image)
-    slope = np.maximum(M - law.coupling * CHI * np.abs(psi), M / 2)
+    psi = void_ratio(law, state) - critical(image, law)
+    slope = np.maximum(M - law.coupling * law.dilatancy * np.abs(psi), M / 2)
     return q / p - slope * (1 + np.log(image / p))
 
 
@@ -271,6 +271,20 @@ def test_huge_increments_return_to_the_surface(strain):
         batch = Batch(SAND, stress, increment, states_of(SAND, stress, psi))
         assert batch.report.failed == 0 and np.isfinite(batch.stress).all() and np.isfinite(batch.tangent).all()
         assert excess(SAND, batch.stress, batch.state).max() < 1e-6  # pressures fall by up to 1e5
+
+
+def test_increments_beyond_all_bounds_fail_or_return_to_the_surface():
+    # Compressible, very loose and stiff: trial pressures of up to exp(100) times those of the start
+    law = sand(critical_compression=0.15, coupling=0.5, dilatancy=5.5, hardening=900.0, rigidity=600.0)
+    stress, increment = random_points(3, 2000, pressure=60e3, deviator=3e3, strain=0.1)
+    start = states_of(law, stress, 0.4)
+    batch = Batch(law, stress, increment, start)
+    failed = (batch.stress == stress).all(axis=1)
+    assert 0 < failed.sum() == batch.report.failed < 1000
+    assert (batch.state[failed] == start[failed]).all() and not batch.tangent[failed].any()
+    for values in (batch.stress, batch.state, batch.tangent):
+        assert np.isfinite(values).all()
+    assert excess(law, batch.stress[~failed], batch.state[~failed]).max() < 1e-6
 
 
 @pytest.mark.parametrize("psi", [LOOSE, DENSE])
