@@ -294,6 +294,7 @@ def find_equilibrium(model: Model, solver: Any, options: Any, tolerance: float, 
 def _attempt_without_time(stepper: Stepper, model: Model) -> str:
     time = model.time
     model._core.time = time - 1.0  # loads are those of the step's end
-    reason = stepper.attempt(1.0)
-    model._core.time = time
-    return reason
+    try:
+        return stepper.attempt(1.0)
+    finally:
+        model._core.time = time

@@ -51,3 +51,13 @@ def test_equilibrate_applies_the_loads_in_parts_and_says_how_far_it_came():
         model.equilibrate(max_steps=100, integration=mpm.Integration.PARTICLES)
     part = float(str(error.value).split("more than ")[1].split()[0])
     assert 20e3 < part * 80e3 < 45e3
+
+
+def test_an_error_in_equilibrate_leaves_the_time_as_it_was():
+    """A step without duration ends at the present time, so that it begins before it."""
+    law = mpm.LinearElastic(young=1e6, poisson=0.2)
+    model = mpm.Model(box([4, 4]), [law, law], velocity_fields=[0, 1])
+    model.seed(density=1000.0, per_cell=3)
+    with pytest.raises(mpm.InputError, match="2 velocity fields, expected one"):
+        model.equilibrate()
+    assert model.time == 0.0
