@@ -106,10 +106,11 @@ def initialise(
 
     Raises:
         InputError: a particle is outside the finite elements' mesh or, moved, outside the background mesh, laws or geometries do
-            not match, or the finite elements did not converge. Raised on all ranks alike.
+            not match, the finite elements did not converge, or `equilibrate` is True where the model has something that
+            `Model.equilibrate` does not support. The particles are unchanged. Raised on all ranks alike.
     """
     particles = of_kind("model", model, mpm.Model).particles
-    _require_usable(model, fem, move)
+    _require_usable(model, fem, move, equilibrate and not resting)
     _warn_of_other_weight(model, fem)
     _warn_of_other_water(model, fem)
     _warn_of_missing_loads(model, fem)
@@ -194,7 +195,7 @@ def _returned(
     return outside
 
 
-def _require_usable(model: mpm.Model, fem: Any, move: bool) -> None:
+def _require_usable(model: mpm.Model, fem: Any, move: bool, equilibrate: bool) -> None:
     solved = not isinstance(fem, QuasiStatic) or fem.converged
     agree(model.comm, None if solved else "fem has not been solved, or its last solution did not converge")
     require_same_geometry(model, fem)
@@ -210,6 +211,16 @@ def _require_usable(model: mpm.Model, fem: Any, move: bool) -> None:
         "and another one where they have none"
     )
     agree(model.comm, None if fits else problem)
+    beyond = {
+        "contact with rigid surfaces": model._contacts,
+        "sides that absorb waves": model._absorbing,
+        "several velocity fields": max(model._velocity_fields) > 0,
+    }
+    found = " and ".join(name for name, there in beyond.items() if there)
+    problem = (
+        f"equilibrate is True, expected False where the model has {found}, which Model.equilibrate does not support"
+    )
+    agree(model.comm, problem if equilibrate and found else None)
     known = not move or hasattr(model.mesh, "domain")
     agree(model.comm, None if known else "model: to move particles its mesh must come from `background_mesh`")
 

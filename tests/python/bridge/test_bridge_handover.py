@@ -326,3 +326,24 @@ def test_particle_outside_is_named():
     model.seed_points([[3.0, 0.5]], [1e-3], density=2000.0)
     with pytest.raises(bridge.InputError, match=r"particles: point .* at \(3, 0.5\) m is outside"):
         bridge.initialise(model, solved())
+
+
+@pytest.mark.parametrize(
+    ("fields", "found"), [(None, "contact with rigid surfaces"), ([0, 1], "several velocity fields")]
+)
+def test_what_equilibrate_does_not_support_is_refused_before_particles_change(fields, found):
+    cells = bridge.box_mesh(MPI.COMM_WORLD, [1.0, 1.0], [4, 4])
+    soil = mpm.LinearElastic(young=1e6, poisson=0.3)
+    elements = bridge.QuasiStatic(cells[0], soil, cells[2], [bridge.fixed(3)], degree=1)
+    elements.solve(bridge.Load(unit_weight=UNIT_WEIGHT))
+    model = mpm.Model(bridge.background_mesh(*cells), [soil, soil], velocity_fields=fields)
+    model.seed(density=UNIT_WEIGHT / 9.81, per_cell=3)
+    model.fix(3)
+    model.set_gravity((0, -9.81))
+    if fields is None:
+        model.add_contact(mpm.Plane((0.0, -0.1), (0.0, 1.0)))
+    with pytest.raises(mpm.InputError, match=f"equilibrate is True, expected False where the model has {found}"):
+        bridge.initialise(model, elements)
+    assert not model.particles.stress.any()
+    bridge.initialise(model, elements, equilibrate=False)
+    assert model.particles.stress.any()
