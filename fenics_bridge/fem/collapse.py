@@ -83,8 +83,10 @@ def collapse_load(
         The result, whose `failed` says whether failure was shown.
 
     Raises:
-        InputError: not even the first steps find equilibrium. Raised on all ranks alike.
+        InputError: `load_of` is no function, or not even the first steps find equilibrium. Raised on all ranks alike.
     """
+    problem = f"load_of is {load_of!r}, expected a function of a number that returns a Load"
+    agree(model.domain.comm, None if callable(load_of) else problem)
     warn_of_locking_at_failure(model)
     found = _follow(model, lambda value: model.equilibrate(load_of(value)), start, first_step, tolerance, progress)
     model.converged = True  # under the load of the last equilibrium, whatever the steps above it

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 from dolfinx.mesh import Mesh
+from mpm_core.checks import within
+from mpm_core.collective import collectively
 from mpm_core.parameter_fields import Field
 from numpy.typing import ArrayLike, NDArray
 
@@ -271,9 +273,10 @@ class QuasiStatic(SupportedBody, PointFunctions):
             Report of the solution.
 
         Raises:
-            InputError: a load or laws that are not possible, or an unknown tag. Raised on all ranks alike.
+            InputError: a load, laws or a duration that are not possible, or an unknown tag. Raised on all ranks alike.
         """
         law = law or self.law
+        duration = collectively(self.domain.comm, lambda: within("duration", duration, 0, np.inf))
         self._loads.require_acting(load, self.load)
         forces = self._loads.forces(load), self._loads.forces(self.load)
         solver = replace(self.solver, **options)

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from mpm_core.checks import of_kind, renamed
+from mpm_core.checks import flag, of_kind, renamed
+from mpm_core.collective import collectively
 from numpy.typing import NDArray
 
 import mpm_core as mpm
@@ -110,6 +111,15 @@ def initialise(
             `Model.equilibrate` does not support. The particles are unchanged. Raised on all ranks alike.
     """
     particles = of_kind("model", model, mpm.Model).particles
+    of_kind("fem", fem, QuasiStatic, ElasticSolution, Consolidation)
+    options = {
+        "count_displacement": count_displacement,
+        "move": move,
+        "smooth": smooth,
+        "equilibrate": equilibrate,
+        "resting": resting,
+    }
+    collectively(model.comm, lambda: [flag(name, value) for name, value in options.items()])
     _require_usable(model, fem, move, equilibrate and not resting)
     _warn_of_other_weight(model, fem)
     _warn_of_other_water(model, fem)

@@ -30,6 +30,13 @@ def within(name: str, value: float, low: float, high: float, *, open_above: bool
     return float(value)
 
 
+def count(name: str, value: int) -> int:
+    """A whole number from one on."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+        raise InputError(f"{name} is {value!r}, expected a whole number from 1 on")
+    return int(value)
+
+
 def real_numbers(name: str, values: Any) -> NDArray[np.float64]:
     """Real numbers of any shape, infinite ones too; text, which NumPy would read, and complex numbers are refused."""
     try:

@@ -10,7 +10,7 @@ from . import checkpoint
 from ._core import InputError, Integration, StressUpdate, Transfer
 from .absorbing import refuse_absorbing
 from .body import Body
-from .checks import flag, of_kind, positive, watcher
+from .checks import count, flag, of_kind, positive, watcher
 from .collective import collectively
 from .contact import refuse_contacts, refuse_driven_bodies, require_new_soil_outside
 from .contact_methods import ContactMethods
@@ -393,13 +393,14 @@ class Model(ContactMethods, Body):
                 without averages balance the loads.
 
         Raises:
+            InputError: an argument out of its range.
             RunError: no equilibrium within ``max_steps``, or a step that did not converge.
         """
         refuse_contacts(self, "equilibrate()")
         refuse_absorbing(self, "equilibrate()")
         refuse_two_phases(self, "equilibrate()")
         integration = integration_of(self, integration)
-        options, method, ratio = collectively(
+        options, method, ratio, most_steps = collectively(
             self.comm,
             lambda: (
                 implicit_options(
@@ -414,6 +415,7 @@ class Model(ContactMethods, Body):
                 ),
                 of_kind("solver", solver or Newton(), Newton, Relaxation),
                 positive("tolerance", tolerance, "(a ratio)"),
+                count("max_steps", max_steps),
             ),
         )
-        return find_equilibrium(self, method, options, ratio, max_steps)
+        return find_equilibrium(self, method, options, ratio, most_steps)

@@ -12,8 +12,15 @@ from fenics_bridge import water
 SOIL = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=25.0)
 
 
+CELLS = bridge.box_mesh(MPI.COMM_SELF, (1.0, 1.0), (2, 2))
+
+
 def model():
     return mpm.Model(box((2, 2)), SOIL)
+
+
+def elements():
+    return bridge.QuasiStatic(CELLS[0], SOIL, CELLS[2], [bridge.fixed(3)])
 
 
 @pytest.mark.parametrize(
@@ -33,6 +40,12 @@ def model():
         (lambda: mpm.tresca(young=1e6, poisson=0.3, shear_strength="20e3"), "shear_strength is '20e3'"),
         (lambda: bridge.roller("left", ("1", "0")), "normal has dtype <U1"),
         (lambda: bridge.initialise("fem", model()), "model is 'fem'"),
+        (lambda: bridge.initialise(model(), "fem"), "fem is 'fem'"),
+        (lambda: bridge.initialise(model(), elements(), move="no"), "move is 'no'"),
+        (lambda: elements().equilibrate(bridge.Load(), duration="1"), "duration is '1'"),
+        (lambda: bridge.collapse_load(elements(), bridge.Load(), 1e3), r"load_of is Load\(\)"),
+        (lambda: model().equilibrate(max_steps="3"), "max_steps is '3'"),
+        (lambda: model().equilibrate(max_steps=0), "max_steps is 0"),
         (lambda: bridge.hydrostatic(0.0, unit_weight="9810"), "unit_weight is '9810' N/m3"),
     ],
 )
@@ -48,7 +61,6 @@ def filled(**options):
 
 
 TEXTS = np.array(["1.5", "2.5"])
-CELLS = bridge.box_mesh(MPI.COMM_SELF, (1.0, 1.0), (2, 2))
 
 
 def seepage(condition):
