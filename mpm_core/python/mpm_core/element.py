@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -62,25 +63,38 @@ class ElementTest:
 
         Raises:
             InputError: another number of components, or such as are neither numbers nor None; a duration below zero.
-            RunError: the law failed, or no strain gives the stresses; the message has the increment. The point is unchanged.
+            RunError: the law failed, or no strain was found that gives the stresses; the message has the increment. The point is unchanged.
         """
         self._dt = within("dt", dt, 0, np.inf)
         try:
-            given = [np.nan if component is None else component for component in strain_increment]  # type: ignore[union-attr]
-            increment = real_numbers("strain_increment", given)
+            components = [np.nan if component is None else component for component in strain_increment]  # type: ignore[union-attr]
+            given = real_numbers("strain_increment", components)
         except (TypeError, InputError):
             raise InputError(f"strain_increment is {strain_increment!r}, expected numbers, or None") from None
-        if increment.shape != self.stress.shape:
-            raise InputError(f"strain_increment has shape {increment.shape}, expected {self.stress.shape}")
-        free = np.isnan(increment)
+        if given.shape != self.stress.shape:
+            raise InputError(f"strain_increment has shape {given.shape}, expected {self.stress.shape}")
+        free, increment = np.isnan(given), given.copy()
         target = self.stress if stress is None else floats("stress", stress, self.stress.shape)
-        # A point that softens may be taken for an elastic one from the first guess, but not from its last increment
-        for guess in (np.zeros_like(self.strain), self._last):
+        for guess in self._guesses(given, free):
             increment[free] = guess[free]
             if self._solved(increment, free, target):
                 self.time += dt if np.isfinite(dt) else 0.0
                 return
-        raise RunError(f"no strain gives the stress {target[free]} Pa; the last strain increment tried is {increment}")
+        raise RunError(
+            f"no strain was found that gives the stress {target[free]} Pa; the last strain increment tried is {increment}: take "
+            "smaller increments, or a stress that the soil can bear"
+        )
+
+    def _guesses(self, given: NDArray[np.float64], free: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
+        """Increments from which Newton's method begins, one after the other; only the free components count."""
+        yield np.zeros_like(given)
+        # A point that softens may be taken for an elastic one from the first guess, but not from its last increment.
+        yield self._last
+        # A point that is pulled may be at its apex, where no strain changes the stress, from both, but not at constant volume.
+        normal = free[:3]
+        same_volume = np.zeros_like(given)
+        same_volume[:3][normal] = -given[:3][~normal].sum() / max(normal.sum(), 1)
+        yield same_volume
 
     def _solved(self, increment: NDArray[np.float64], free: NDArray[np.bool_], target: NDArray[np.float64]) -> bool:
         """Find the free components of the increment from those given, in place; take the step if there are any."""

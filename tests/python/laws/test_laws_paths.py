@@ -221,3 +221,17 @@ def test_increments_of_cam_clay_may_be_large():
             often.step(total / 1000)
         errors[strain] = np.abs(once.stress - often.stress).max() / np.abs(often.stress).max()
     assert errors[1e-3] < 0.01 and errors[5e-3] < 0.03 and errors[2e-2] < 0.1
+
+
+@pytest.mark.parametrize("steps", [1, 3, 100])
+def test_triaxial_extension_in_one_increment_or_many(steps):
+    """At failure the pressure p = -s3 on the sides is the largest principal stress: s1 = -(p - 2 c sqrt(K)) / K."""
+    cohesion, k = 10e3, 3.0  # (1 + sin phi) / (1 - sin phi) of 30 degrees
+    test = mpm.ElementTest(
+        mpm.MohrCoulomb(**ELASTIC, cohesion=cohesion, friction_angle=30.0), [-PRESSURE] * 3 + [0.0] * 3
+    )
+    yield_strain = (PRESSURE * (1 - 1 / k) + 2 * cohesion / np.sqrt(k)) / YOUNG
+    for _ in range(steps):
+        test.step([5 * yield_strain / steps, None, None, 0.0, 0.0, 0.0])
+    axial = -(PRESSURE - 2 * cohesion * np.sqrt(k)) / k
+    assert test.stress == pytest.approx([axial, -PRESSURE, -PRESSURE, 0, 0, 0], abs=1e-6 * PRESSURE)
