@@ -6,6 +6,7 @@
 #include "model/absorbing.h"
 #include "model/contacts.h"
 #include "model/far_field.h"
+#include "model/integration.h"
 #include "model/mapping.h"
 #include "model/moving_cells.h"
 #include "model/placement.h"
@@ -89,6 +90,31 @@ void set_free_field(Model<G>& model, std::size_t number, const std::vector<doubl
   auto& grounds = model.fields.front().free_fields;
   grounds.resize(std::max(grounds.size(), number + 1));
   grounds[number] = {heights, times, std::move(states)};
+}
+
+/// What each owned cell integrated [N m] in the last step, the sum over velocity fields: (cells, n), components of a
+/// stress, of which that across the plane is left out.
+/// @pre the model is prepared
+/// @note Collective where stresses are integrated over whole cells
+template <class G, int D = G::dim>
+py::array_t<double> integrated_stresses(Model<G>& model)
+{
+  constexpr auto n = static_cast<std::size_t>(n_stress<D>);
+  std::vector<double> sums(static_cast<std::size_t>(model.mesh.owned_cells) * n, 0.0);
+  for (auto& field : model.fields)
+  {
+    begin_integration(model.mesh, model.exchange, model.particles, model.order.runs, field);
+    for (Index c = 0; c < model.mesh.owned_cells; ++c)
+    {
+      if (!(field.moments[c].mass > 0))
+        continue;
+      const Working<G> stress = integrated_stress(model.mesh, field, c);
+      for (int k = 0; k < n_symmetric<D>; ++k)
+        sums[static_cast<std::size_t>(c) * n + static_cast<std::size_t>(stress_component<D>[k])] += stress[k];
+    }
+  }
+  return py::array_t<double>({static_cast<py::ssize_t>(model.mesh.owned_cells), static_cast<py::ssize_t>(n)},
+                             sums.data());
 }
 
 template <class G, int D = G::dim>
@@ -238,6 +264,12 @@ void bind_model(py::module_& m, const std::string& suffix)
              stand_water(model, model.time, gravity);
              map_to_nodes(model);
              return out_of_balance(model, gravity);
+           })
+      .def("integrated_stress",
+           [](M& model)
+           {
+             prepare(model);
+             return integrated_stresses(model);
            })
       .def("averaged_pressures",
            [](M& model)

@@ -193,10 +193,12 @@ def _filled_cells_of(model: Model, points: NDArray[np.float64]) -> NDArray[np.in
 
 
 class SectionProbe:
-    """Force that acts across a plane (a line, in two dimensions), from the particles' stresses in the cells that it cuts.
+    """Force that acts across a plane (a line, in two dimensions), from the stresses in the cells that it cuts.
 
     The traction sigma . n is taken over the cut cells with the weight that rises from 0 at their nodes behind the plane to 1 at
-    those before it: sum_c (sum_p V_p sigma_p) . grad w. So the force balances, to round-off, the nodal forces on either side.
+    those before it: sum_c (sum_p V_p sigma_p) . grad w. Where full cells integrated the mean stress over their volume in the last
+    step (`Integration`), they do here. So the force balances, to round-off, the nodal forces on either side, unless nodal mixed
+    discretisation averages these. Stresses are those of the laws, effective ones where particles have pore water.
 
     Args:
         model: the model.
@@ -245,9 +247,8 @@ class SectionProbe:
         model, dim = self.model, self.model.mesh.dim
         if self._mesh is not model.mesh or model._core.has_moved_cells:
             self._cut(model.mesh)
-        inside = model.particles[self._is_cut[model.particles.cell]]
-        stress = _matrices(inside.stress, dim) * inside.volume[:, None, None]
-        mine = np.einsum("pij,pj->i", stress, self._gradient[inside.cell])
+        stress = _matrices(model._core.integrated_stress()[self._is_cut], dim)
+        mine = np.einsum("cij,cj->i", stress, self._gradient[self._is_cut])
         force = np.empty(dim)
         model.comm.Allreduce(mine, force)
         along = {"force_normal_N": float(force @ self._normal)}

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from core_cases import DIMS, box, by_id, moduli, rollers, run
 from implicit_cases import slope
+from mpm_core.probes import SectionProbe
 
 import mpm_core as mpm
 from mpm_core import Integration
@@ -27,6 +28,22 @@ def internal_force(model, integration):
     """At the nodes, of the stresses as they are."""
     run(model, 1e-9, dt=1e-9, integration=integration)
     return model.nodal("internal_force")
+
+
+@pytest.mark.parametrize("dim", DIMS)
+@pytest.mark.parametrize("integration", MODES)
+def test_a_section_carries_the_nodal_forces_on_either_side(dim, integration):
+    """The forces on the nodes before a plane are those that act across it, since those of each whole cell add up to nothing."""
+    model = unevenly_filled(dim)
+    model.particles.set("stress", np.random.default_rng(1).uniform(-1, 1, model.particles.stress.shape))
+    point, normal = np.full(dim, 0.47), np.array([1.0, 0.4, -0.3])[:dim]
+    force = internal_force(model, integration)
+    before = (model.mesh.points - point) @ normal > 0
+    section = SectionProbe(model, point=point, normal=normal).values()
+    across = [section[f"force_{axis}_N"] for axis in "xyz"[:dim]]
+    scale = np.abs(force[before]).sum()
+    assert across == pytest.approx(force[before].sum(axis=0), abs=1e-9 * scale)
+    assert np.abs(across).max() > 1e-3 * scale
 
 
 @pytest.mark.parametrize("dim", DIMS)
