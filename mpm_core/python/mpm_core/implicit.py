@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -252,8 +253,25 @@ def find_equilibrium(model: Model, solver: Any, options: Any, tolerance: float, 
     The out-of-balance force is applied at once, or in parts where that fails. The steps that apply it move the particles; the
     steps that follow do not, because a particle could cross between two cells for ever, driven by the jump of the nodal forces
     at each crossing. The forces of the ghost penalty, which are part of a step's equilibrium but not of the particles', decrease
-    from step to step.
+    from step to step. Supports with a prescribed velocity stand still.
     """
+    with _standing_supports(model):
+        return _found_equilibrium(model, solver, options, tolerance, max_steps)
+
+
+@contextmanager
+def _standing_supports(model: Model) -> Iterator[None]:
+    """Hold supports with a prescribed velocity where they are: a step without duration has a nominal one of a second."""
+    still = [(tag, whole, [v and 0.0 for v in vector] if whole else vector) for tag, whole, vector in model._conditions]
+    model._core.set_supports(still)
+    try:
+        yield
+    finally:
+        model._core.set_supports(model._conditions)
+
+
+def _found_equilibrium(model: Model, solver: Any, options: Any, tolerance: float, max_steps: int) -> ImplicitReport:
+    """See `find_equilibrium`."""
     model._core.convert_near_surfaces(0.0)
     options.at_rest = True  # laws that depend on rate end where slow loading has them
     stepper = Stepper(model, solver, options, 1.0)

@@ -378,7 +378,7 @@ class Model(ContactMethods, Body):
 
         This is needed after an imported initial state, and after particles have moved to other cells, when their stresses
         no longer balance the loads. Velocities become zero. The first step moves the particles, the others only change
-        their stresses.
+        their stresses. Supports with a prescribed velocity stand still.
 
         Args:
             solver: solver of each step; Newton's method by default.

@@ -61,3 +61,22 @@ def test_an_error_in_equilibrate_leaves_the_time_as_it_was():
     with pytest.raises(mpm.InputError, match="2 velocity fields, expected one"):
         model.equilibrate()
     assert model.time == 0.0
+
+
+@pytest.mark.parametrize("small_displacements", [False, True])
+def test_a_plate_that_will_move_stands_still_in_equilibrate(small_displacements):
+    """Between a base and a plate at rest the mean vertical strain of a block, and so its mean stress, is zero."""
+    law = mpm.LinearElastic(young=1e6, poisson=0.2)
+    model = mpm.Model(box([4, 4]), law)
+    model.seed(density=1000.0, per_cell=3)
+    for tag in (1, 2):
+        model.roller(tag, (1, 0))
+    model.roller(3, (0, 1))
+    model.prescribe(4, (None, -0.01))
+    model.set_gravity((0, -10.0))
+    model.equilibrate(small_displacements=small_displacements)
+    weight = 1000.0 * 10.0
+    assert abs(model.particles.stress[:, 1].mean()) < 0.01 * weight
+    assert model.particles.stress[:, 1].max() == pytest.approx(weight * (1 / 2 - 1 / 8), rel=0.05)  # upper row of cells
+    model.implicit(0.1, dt=0.1, quasi_static=True, small_displacements=True).last()
+    assert model.particles.stress[:, 1].mean() == pytest.approx(-0.1 * 0.01 * law.p_wave_modulus, rel=0.1)
