@@ -107,8 +107,8 @@ def initialise(
 
     Raises:
         InputError: a particle is outside the finite elements' mesh or, moved, outside the background mesh, laws or geometries do
-            not match, the finite elements did not converge, or `equilibrate` is True where the model has something that
-            `Model.equilibrate` does not support. The particles are unchanged. Raised on all ranks alike.
+            not match, the finite elements did not converge, gravity still rises, or `equilibrate` is True where the model has
+            something that `Model.equilibrate` does not support. The particles are unchanged. Raised on all ranks alike.
     """
     particles = of_kind("model", model, mpm.Model).particles
     of_kind("fem", fem, QuasiStatic, ElasticSolution, Consolidation)
@@ -221,18 +221,33 @@ def _require_usable(model: mpm.Model, fem: Any, move: bool, equilibrate: bool) -
         "and another one where they have none"
     )
     agree(model.comm, None if fits else problem)
+    agree(model.comm, _not_equilibrated(model) if equilibrate else None)
+    agree(model.comm, _rising_gravity(model))
+    known = not move or hasattr(model.mesh, "domain")
+    agree(model.comm, None if known else "model: to move particles its mesh must come from `background_mesh`")
+
+
+def _not_equilibrated(model: mpm.Model) -> str | None:
+    """What `Model.equilibrate` does not support, in words; None for nothing."""
     beyond = {
         "contact with rigid surfaces": model._contacts,
         "sides that absorb waves": model._absorbing,
         "several velocity fields": max(model._velocity_fields) > 0,
     }
     found = " and ".join(name for name, there in beyond.items() if there)
-    problem = (
-        f"equilibrate is True, expected False where the model has {found}, which Model.equilibrate does not support"
+    words = f"equilibrate is True, expected False where the model has {found}, which Model.equilibrate does not support"
+    return words if found else None
+
+
+def _rising_gravity(model: mpm.Model) -> str | None:
+    """How much of its gravity a model has, in words, while this rises; None afterwards."""
+    ramp, gravity = model._core.gravity_ramp, model.gravity
+    if model.time >= ramp or not gravity.any():
+        return None
+    return (
+        f"gravity is {model.time / ramp:.0%} of {gravity.tolist()} m/s2 at t = {model.time:g} s, and rises until {ramp:g} s (ramp "
+        "of set_gravity), expected all of it at the hand-over"
     )
-    agree(model.comm, problem if equilibrate and found else None)
-    known = not move or hasattr(model.mesh, "domain")
-    agree(model.comm, None if known else "model: to move particles its mesh must come from `background_mesh`")
 
 
 def _warn_of_other_weight(model: mpm.Model, fem: Any) -> None:

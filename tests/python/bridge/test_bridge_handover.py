@@ -347,3 +347,14 @@ def test_what_equilibrate_does_not_support_is_refused_before_particles_change(fi
     assert not model.particles.stress.any()
     bridge.initialise(model, elements, equilibrate=False)
     assert model.particles.stress.any()
+
+
+def test_gravity_that_still_rises_is_refused_and_said():
+    """Under the gravity at the start of a ramp, which is zero, particles would lose the stresses that they are given."""
+    particles, elements = slope_particles(UNIT_WEIGHT), solved(degree=1)
+    particles.set_gravity(particles.gravity, ramp=2.0)
+    with pytest.raises(mpm.InputError, match=r"gravity is 0% of \[0.0, -9.81\] m/s2 at t = 0 s, and rises until 2 s"):
+        bridge.initialise(particles, elements)
+    particles.set_gravity(particles.gravity)
+    bridge.initialise(particles, elements)
+    assert particles.particles.stress[:, 1].min() < -0.7 * UNIT_WEIGHT  # the slope is 1 m high
