@@ -225,6 +225,13 @@ void bind_model(py::module_& m, const std::string& suffix)
       .def_readwrite("gravity", &M::gravity)
       .def_readwrite("gravity_ramp", &M::gravity_ramp)
       .def_readwrite("time", &M::time)
+      .def_property(
+          "last_integration", [](const M& model) { return model.fields.front().integration.kind; },
+          [](M& model, Integration kind)
+          {
+            for (auto& field : model.fields)
+              field.integration.kind = kind;
+          })
       .def_property_readonly("size", [](const M& model) { return model.particles.size(); })
       .def_property_readonly("steps", [](const M& model) { return model.totals.steps; })
       .def_property_readonly("sorts", [](const M& model) { return model.totals.sorts; })

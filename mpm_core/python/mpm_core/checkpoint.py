@@ -359,6 +359,7 @@ def _description(model: Model) -> dict[str, Any]:
         "cuts": model.repartitions,
         "left_imbalance": model._left_imbalance,
         "integration": None if model._integration is None else model._integration.name,
+        "last_integration": core.last_integration.name,
         "contacts": model._contacts,
         "collisions": model._collisions,
         "field_contacts": model._field_contacts,
@@ -408,6 +409,7 @@ def _take(model: Model, there: dict[str, Any]) -> None:
     model._next_id = there["next_id"]
     model._left_imbalance = there["left_imbalance"]
     model._integration = _core.Integration.__members__.get(there["integration"])
+    core.last_integration = _core.Integration.__members__[there.get("last_integration") or "PARTICLES"]
     model._control = None
     model._resumed = StepControl(**there["implicit"]) if there["implicit"] else None
     collectively(model.comm, lambda: core.set_supports(model._conditions))

@@ -187,6 +187,10 @@ _ENTRIES: dict[str, tuple[Any, str]] = {
         AnyOf([_NONE, set(Integration.__members__)]),
         f"null, or one of {', '.join(Integration.__members__)}",
     ),
+    "last_integration": (
+        AnyOf([_NONE, set(Integration.__members__)]),  # null in older files
+        f"null, or one of {', '.join(Integration.__members__)}",
+    ),
     "implicit": (AnyOf([_NONE, _CONTROL]), "null, or the state of an implicit run"),
     "notes": (dict, "a table"),
     "sums": (_is_table_of_sums, "a table of numbers"),

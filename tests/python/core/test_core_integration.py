@@ -46,6 +46,17 @@ def test_a_section_carries_the_nodal_forces_on_either_side(dim, integration):
     assert np.abs(across).max() > 1e-3 * scale
 
 
+def test_a_section_is_the_same_after_a_restart(tmp_path):
+    models = unevenly_filled(2), mpm.Model(unevenly_filled(2).mesh, ELASTIC)
+    models[0].particles.set("stress", np.random.default_rng(1).uniform(-1, 1, models[0].particles.stress.shape))
+    internal_force(models[0], Integration.MIXED)
+    models[0].save(tmp_path / "state.h5")
+    models[1].restore(tmp_path / "state.h5")
+    one, other = (SectionProbe(model, point=(0.47, 0.47), normal=(1.0, 0.4)).values() for model in models)
+    assert one["force_normal_N"] != 0.0
+    assert one == other
+
+
 @pytest.mark.parametrize("dim", DIMS)
 @pytest.mark.parametrize("integration", MODES)
 def test_internal_forces_of_any_stress_add_up_to_nothing(dim, integration):
