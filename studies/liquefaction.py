@@ -5,8 +5,9 @@ a fraction of the effective vertical stresses, as in an earthquake, and effectiv
 stresses stay, which equilibrium asks for, as far as the strength that is left carries them. Soil and water then move with separate
 velocities. Fine sand hardly drains while it flows; coarse sand drains as fast as it flows.
 
-As long as its pores are full, the sand keeps its volume (`volume_gain`) and flows out until its surface is nearly level. Loose sand
-would contract and flow further, so that the run-out is a lower bound; dense sand would stop earlier. Use `--air-entry 0` for
+As long as its pores are full, the sand keeps its volume (`volume_gain`) and flows out until its surface is nearly level. By default
+its grains follow the law of Mohr and Coulomb without dilation. Loose sand contracts as it is sheared, which raises the pore pressures
+further, and dense sand dilates: `--material nor-sand` with its `--state-parameter`. Use `--air-entry 0` for
 sand so coarse that it sustains no suction: it dilates where effective stresses would become tensile, and its pores empty.
 """
 
@@ -21,16 +22,17 @@ import numpy as np
 from common import body_runs
 from common.body_runs import BodyRun, follow
 from common.checkpoint import check_restart
-from common.checks import check_cells
+from common.checks import check_cells, check_effect
 from common.figures import Pictures, curve_figure
 from common.history import History
 from common.lengths import metres
 from common.movie import QUANTITIES, WET_QUANTITIES, particle_movie
-from common.options import add_number, check, formerly, study_parser
+from common.options import add_choice, add_number, check, formerly, study_parser
 from common.plots import CURVES, Scene, colour_limits, save_particles
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
+from common.soils import add_parameter
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -41,6 +43,9 @@ GRAVITY, WATER = 9.81, 1000.0  # m/s2, kg/m3
 GRAINS = 2650.0
 FRONT = 0.01
 """Part of the soil that lies beyond its front"""
+NOR_SAND = {"critical_void_ratio": 1.0, "critical_compression": 0.03, "critical_slope": 1.25, "dilatancy": 4.0, "hardening": 100.0,
+            "rigidity": 200.0, "coupling": 0.2, "attraction": 100.0}  # fmt: skip
+"""Parameters of NorSand that are options, of which the attraction [Pa] keeps some strength at the surface"""
 COLUMNS = ["time_s", "runout_m", "crest_settlement_m", "pressure_ratio", "volume_gain", "water_out_m2", "fastest_m_per_s",
            "kinetic_energy_J", "unexplained_fraction_of_energy", "dt_s"]  # fmt: skip
 
@@ -64,9 +69,14 @@ def parser() -> ArgumentParser:
     add_number(
         p, "--water-modulus", 2e7, "Pa", "bulk modulus of the water; values below 2.2e9 allow longer steps", above=0
     )
-    add_number(p, "--young", 1e7, "Pa", "Young's modulus of the sand", above=0)
-    add_number(p, "--friction-angle", 33.0, "degrees", "friction angle of the sand", above=0, below=50)
-    add_number(p, "--cohesion", 100.0, "Pa", "cohesion of the sand", at_least=0)
+    add_choice(p, "--material", "mohr-coulomb", ("mohr-coulomb", "nor-sand"), "law of the sand")
+    add_number(p, "--young", 1e7, "Pa", "Mohr-Coulomb: Young's modulus of the sand", above=0)
+    add_number(p, "--friction-angle", 33.0, "degrees", "Mohr-Coulomb: friction angle of the sand", above=0, below=50)
+    add_number(p, "--cohesion", 100.0, "Pa", "Mohr-Coulomb: cohesion of the sand", at_least=0)
+    add_number(p, "--state-parameter", 0.08, "-", "NorSand: void ratio at the start less that of the critical state at the same "
+               "pressure; above 0 for loose sand")  # fmt: skip
+    for name, value in NOR_SAND.items():
+        add_parameter(p, mpm.NorSand, name, value, "NorSand: ")
     add_number(p, "--time", 6.0, "s", "duration", above=0)
     add_number(p, "--air-entry", 2e4, "Pa", "suction up to which pores stay full; 0 lets them run empty", at_least=0)
     body_runs.add_body_run_options(p, damping=0.0, pic=0.01, nmd=True, frames=60)
@@ -76,8 +86,17 @@ def parser() -> ArgumentParser:
 def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     a = p.parse_args(arguments)
-    check(p, a.angle < a.friction_angle, lambda: f"--angle is {a.angle:g}, expected less than --friction-angle, "
-          f"{a.friction_angle:g} degrees")  # fmt: skip
+    loose = a.material == "nor-sand"
+    check_effect(p, a, not loose, ("--young", "--friction-angle", "--cohesion"), "--material mohr-coulomb")
+    of_nor_sand = ("--state-parameter", *("--" + name.replace("_", "-") for name in NOR_SAND))
+    check_effect(p, a, loose, of_nor_sand, "--material nor-sand")
+    sine = (
+        3 * a.critical_slope / (6 + a.critical_slope)
+    )  # of the friction angle of the critical state, in triaxial compression
+    friction, option = (
+        (np.degrees(np.arcsin(sine)), "that of --critical-slope") if loose else (a.friction_angle, "--friction-angle")
+    )
+    check(p, a.angle < friction, lambda: f"--angle is {a.angle:g}, expected less than {option}, {friction:.3g} degrees")
     length = a.crest + a.height / np.tan(np.radians(a.angle)) + a.runout_length
     check_cells(
         p,
@@ -107,12 +126,20 @@ def depth(a: Namespace, x: np.ndarray) -> np.ndarray:
     return np.maximum(surface - x[:, 1], 0.0)
 
 
+def sand(a: Namespace) -> mpm.MohrCoulomb | mpm.NorSand:
+    """The law of the skeleton."""
+    if a.material == "mohr-coulomb":
+        strength = {"cohesion": a.cohesion, "friction_angle": a.friction_angle, "dilation_angle": 0.0}
+        return mpm.MohrCoulomb(young=a.young, poisson=0.3, **strength)
+    at_base = (density(a) - WATER) * GRAVITY * a.height  # of which the largest stiffness, and so the time step, follows
+    parameters = {name: getattr(a, name) for name in NOR_SAND}
+    return mpm.NorSand(**parameters, poisson=0.2, image_pressure=at_base, void_ratio=a.porosity / (1 - a.porosity))
+
+
 def build(a: Namespace) -> mpm.Model:
     """The slope at rest, and then with the raised pore pressures. Collective."""
     mesh = bridge.slope_mesh(comm, a.height, a.angle, a.crest, a.cell_size, kind="gmsh", runout=a.runout_length)
-    sand = mpm.MohrCoulomb(young=a.young, poisson=0.3, cohesion=a.cohesion, friction_angle=a.friction_angle,
-                           dilation_angle=0.0)  # fmt: skip
-    model = mpm.Model(bridge.background_mesh(*mesh), sand)
+    model = mpm.Model(bridge.background_mesh(*mesh), sand(a))
     if a.restart is not None:
         model.restore(a.restart)
         return model
@@ -133,6 +160,9 @@ def raise_pressures(a: Namespace, model: mpm.Model) -> None:
     p, buoyant = model.particles, (density(a) - WATER) * GRAVITY
     model.set_pore_pressure(lambda x: WATER * GRAVITY * depth(a, x))
     p.set("stress", -buoyant * depth(a, p.position)[:, None] * np.array([0.5, 1.0, 0.5, 0.0]))
+    if a.material == "nor-sand":
+        for name, values in mpm.nor_sand_state(model.laws[0], p.stress, a.state_parameter).items():
+            model.set_state(name, values)
     model.equilibrate(integration=mpm.Integration.MIXED)
     p.set("initial_position", p.position)  # displacements count from here
     raised = np.maximum(-a.pressure_ratio * p.stress[:, 1], 0.0)

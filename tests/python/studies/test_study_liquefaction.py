@@ -74,26 +74,65 @@ def test_gravel_that_drains_and_carries_its_weight_rests(tmp_path):
     assert result["water_out_m2"] > 0.05
 
 
-def test_sand_that_hardly_drains_runs_out_as_far_as_the_law_of_undrained_soil_lets_it():
+@pytest.mark.parametrize(
+    "options",
+    [["--cell-size", "0.3"], ["--cell-size", "0.4", "--material", "nor-sand", "--pressure-ratio", "0.5"]],
+    ids=["Mohr-Coulomb", "NorSand"],
+)
+def test_sand_that_hardly_drains_runs_out_as_far_as_the_law_of_undrained_soil_lets_it(options):
     """In 6 s hardly any water leaves fine sand: soil and water with velocities of their own, and a law of undrained soil that has
     the same skeleton and the same water, start from the same stresses and run out alike."""
-    a = study.parse(["--cell-size", "0.3"])
+    a = study.parse(options)
     model = study.build(a)
     skeleton = model.laws[0]
     undrained = mpm.Model(model.mesh, mpm.Undrained(skeleton, water_modulus=a.water_modulus, porosity=a.porosity))
-    undrained.seed(density=study.density(a), per_cell=a.particles_per_cell, cell_tag=bridge.SOIL)
+    wet, whole = model.particles, undrained.particles
+    undrained.seed_points(wet.position, wet.volume, density=study.density(a))
     for tag in (bridge.LEFT, bridge.RIGHT):
         undrained.roller(tag, (1, 0))
     undrained.fix(bridge.BASE)
     undrained.set_gravity((0.0, -study.GRAVITY))
-    wet, whole = model.particles, undrained.particles
-    same = np.argsort(wet.id)[np.argsort(np.argsort(whole.id))]
-    np.testing.assert_allclose(whole.position, wet.position[same], atol=1e-2)  # but for the settlement to equilibrium
+    same = whole.id  # in the order in which they were given
     whole.set("stress", wet.stress[same] - wet.pore_pressure[same][:, None] * np.array([1.0, 1.0, 1.0, 0.0]))
     undrained.set_state("excess_pore_pressure", wet.pore_pressure[same])
+    for number, name in enumerate(skeleton.state_names):
+        undrained.set_state(name, wet.state[same, number])
     runouts = []
     for m in (model, undrained):
         start = study.front(m.particles.position[:, 0], m.particles.volume)
         m.explicit(a.time, pic=a.pic, nmd=True, integration=mpm.Integration.MIXED).last()
         runouts.append(study.front(m.particles.position[:, 0], m.particles.volume) - start)
     assert runouts[0] == pytest.approx(runouts[1], rel=0.15) and runouts[1] > 2
+
+
+def test_loose_sand_flows_where_dense_sand_rests(tmp_path):
+    """Pore pressures that take half of the effective stresses leave twice the shear stress over them, tan 12 / (1 - 0.5) = 0.43, below
+    the friction of the critical state, tan(arcsin(3 M / (6 + M))) = 0.59: only sand that contracts loses the rest of its strength.
+    """
+    nor_sand = ["--material", "nor-sand", "--pressure-ratio", "0.5", "--time", "4"]
+    loose = slid(tmp_path / "loose", *nor_sand)
+    assert loose["runout_m"] > 1.0 and loose["crest_settlement_m"] > 0.4
+    dense = slid(tmp_path / "dense", *nor_sand, "--state-parameter", "-0.05")
+    assert abs(dense["runout_m"]) < 0.01 and abs(dense["crest_settlement_m"]) < 0.01
+    at_rest = slid(tmp_path / "at_rest", *nor_sand, "--pressure-ratio", "0")
+    assert abs(at_rest["runout_m"]) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (
+            ["--material", "nor-sand", "--cohesion", "3"],
+            "--cohesion is given, expected --material mohr-coulomb with it",
+        ),
+        (["--state-parameter", "0.1"], "--state-parameter is given, expected --material nor-sand with it"),
+        (
+            ["--material", "nor-sand", "--angle", "31.3"],
+            "--angle is 31.3, expected less than that of --critical-slope, 31.1",
+        ),
+    ],
+)  # sin phi = 3 * 1.25 / (6 + 1.25)
+def test_options_of_the_other_law_are_refused(options, words, capsys):
+    with pytest.raises(SystemExit):
+        study.parse(options)
+    assert words in " ".join(capsys.readouterr().err.split())
