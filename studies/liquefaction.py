@@ -90,12 +90,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check_effect(p, a, not loose, ("--young", "--friction-angle", "--cohesion"), "--material mohr-coulomb")
     of_nor_sand = ("--state-parameter", *("--" + name.replace("_", "-") for name in NOR_SAND))
     check_effect(p, a, loose, of_nor_sand, "--material nor-sand")
-    sine = (
-        3 * a.critical_slope / (6 + a.critical_slope)
-    )  # of the friction angle of the critical state, in triaxial compression
-    friction, option = (
-        (np.degrees(np.arcsin(sine)), "that of --critical-slope") if loose else (a.friction_angle, "--friction-angle")
-    )
+    friction, option = friction_angle(a), "that of --critical-slope" if loose else "--friction-angle"
     check(p, a.angle < friction, lambda: f"--angle is {a.angle:g}, expected less than {option}, {friction:.3g} degrees")
     length = a.crest + a.height / np.tan(np.radians(a.angle)) + a.runout_length
     check_cells(
@@ -118,6 +113,12 @@ def parse(arguments: list[str] | None = None) -> Namespace:
 def density(a: Namespace) -> float:
     """Density of the saturated sand [kg/m3]."""
     return float((1 - a.porosity) * GRAINS + a.porosity * WATER)
+
+
+def friction_angle(a: Namespace) -> float:
+    """Friction angle of the sand [degrees]: of NorSand that of the critical state in triaxial compression."""
+    of_critical_state = np.degrees(np.arcsin(3 * a.critical_slope / (6 + a.critical_slope)))
+    return a.friction_angle if a.material == "mohr-coulomb" else float(of_critical_state)
 
 
 def depth(a: Namespace, x: np.ndarray) -> np.ndarray:

@@ -8,6 +8,8 @@
 #include "materials/tools/root.h"
 #include "materials/tools/secant.h"
 
+#include <array>
+#include <limits>
 #include <optional>
 
 namespace mpm::materials::nor_sand
