@@ -6,6 +6,7 @@
 
 #include <limits>
 #include <string_view>
+#include <utility>
 
 namespace mpm::materials
 {
@@ -38,6 +39,19 @@ struct PointBatch
   /// row by row. Null stands for 1 + strain increment: small displacements, or no law needs it
   std::array<const double*, D * D> deformation{};
 };
+
+/// Stress and strain increment of a point as tensors
+template <int D>
+std::pair<SymTensor<D>, SymTensor<D>> tensors_of(const PointBatch<D>& points, Index i)
+{
+  SymTensor<D> stress, strain;
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+  {
+    stress[k] = points.stress[k][i];
+    strain[k] = points.strain_increment[k][i] * (k < 3 ? 1 : 0.5); // engineering shear to components
+  }
+  return {stress, strain};
+}
 
 /// What of a batch a law needs beyond what all are given, so that it is not worked out for others.
 struct Needs

@@ -116,12 +116,7 @@ SecantSlopes slopes(const Start<D>& a, const Result<D>& r, bool plastic, double 
 template <int D>
 Start<D> start_of(const CamClay& law, const PointBatch<D>& points, Index i)
 {
-  SymTensor<D> stress, strain;
-  for (std::size_t k = 0; k < n_stress<D>; ++k)
-  {
-    stress[k] = points.stress[k][i];
-    strain[k] = points.strain_increment[k][i] * (k < 3 ? 1 : 0.5);
-  }
+  const auto [stress, strain] = tensors_of(points, i);
   const double volume = (1 + law.void_ratio) * std::exp(points.state[2][i]);
   return {volume / law.swelling,
           volume / (law.compression - law.swelling),

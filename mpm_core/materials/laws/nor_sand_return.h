@@ -36,12 +36,7 @@ struct Start
 template <int D>
 Start<D> start_of(const NorSand& law, const PointBatch<D>& points, Index i)
 {
-  SymTensor<D> stress, strain;
-  for (std::size_t k = 0; k < n_stress<D>; ++k)
-  {
-    stress[k] = points.stress[k][i];
-    strain[k] = points.strain_increment[k][i] * (k < 3 ? 1 : 0.5);
-  }
+  const auto [stress, strain] = tensors_of(points, i);
   Start<D> a{law, bulk_per_pressure(law), 1e-6 * (law.reference_pressure + law.attraction), 0, 0, 0, 0, 0, {}, {}};
   a.pressure = law.attraction - mean<D>(stress);
   a.image = (law.image_pressure + law.attraction) * std::exp(points.state[1][i]);
