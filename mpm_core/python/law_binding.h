@@ -202,8 +202,7 @@ py::class_<L> bind_law(py::module_& m, const std::string& name, const std::strin
       .def("wave_moduli", &wave_moduli<L>, py::arg("stress"), py::arg("state"),
            "Moduli of compression and shear waves of points as they are now (n, 2) [Pa]; they differ from those of the "
            "law's numbers in `CamClay` and `NorSand`, by the pressure, and in `Heterogeneous`. Stress (n, S) [Pa], "
-           "state (n, "
-           "n_state).")
+           "state (n, n_state).")
       .def_property_readonly(
           "needs_cell_size", [](const L& law) { return needs(law).cell_size; },
           "Whether what the law does depends on the size of a point's cell")
