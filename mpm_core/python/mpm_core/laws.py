@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import CamClay, ConeMatch, DruckerPrager, InputError, MohrCoulomb, NorSand, cone_slope, cone_strength
-from .checks import member, positive
+from .checks import member, positive, real_numbers
 from .mesh import floats
 
 
@@ -112,7 +112,7 @@ def nor_sand_state(
     """
     _check_overconsolidation(overconsolidation)
     pressure, q = _pressure_and_q(law, stress)
-    psi = np.broadcast_to(np.asarray(state_parameter, dtype=float), pressure.shape)
+    psi = np.broadcast_to(real_numbers("state_parameter", state_parameter), pressure.shape)
     void_ratio = law.critical_void_ratio - law.critical_compression * np.log(pressure / 1e3) + psi
     wrong = ~(void_ratio > 0)
     if wrong.any():
