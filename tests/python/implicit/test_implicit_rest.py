@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from core_cases import box
+from core_cases import box, rollers
 from implicit_cases import crest_displacement, slope
 
 import mpm_core as mpm
@@ -14,9 +14,7 @@ def test_reactions_take_the_place_of_external_force_under_prescribed_displacemen
     law = mpm.LinearElastic(young=1e6, poisson=0.2)
     model = mpm.Model(box([4, 4]), law)
     model.seed(density=1000.0, per_cell=3)
-    for tag in (1, 2):
-        model.roller(tag, (1, 0))
-    model.roller(3, (0, 1))
+    rollers(model, but=(4,))
     model.prescribe(4, (0, -0.01))
     *_, report = model.implicit(1.0, dt=1.0, quasi_static=True)
     expected = -0.01 * law.p_wave_modulus
@@ -69,9 +67,7 @@ def test_a_plate_that_will_move_stands_still_in_equilibrate(small_displacements)
     law = mpm.LinearElastic(young=1e6, poisson=0.2)
     model = mpm.Model(box([4, 4]), law)
     model.seed(density=1000.0, per_cell=3)
-    for tag in (1, 2):
-        model.roller(tag, (1, 0))
-    model.roller(3, (0, 1))
+    rollers(model, but=(4,))
     model.prescribe(4, (None, -0.01))
     model.set_gravity((0, -10.0))
     model.equilibrate(small_displacements=small_displacements)
