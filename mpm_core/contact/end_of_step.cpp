@@ -1,7 +1,6 @@
 #include "contact/end_of_step.h"
 
 #include "contact/clearance.h"
-#include "contact/touch.h"
 
 #include <cmath>
 #include <optional>
@@ -115,24 +114,44 @@ Matrix<D> trial_slip_derivative(const Vector<D>& normal, const Vector<D>& a, con
   return combined<D>(1, moved, -1, tilted);
 }
 
+/// The elastic slip L at which the contact has its shear strength, and its derivatives.
+struct LongestSlip
+{
+  double value;     ///< [m]
+  double by_radius; ///< dL/dr [-]
+  double by_water;  ///< dL/dp [m/Pa]
+};
+
+/// @param overlap  of the particle and the surface, over the length of the onset
+template <int D>
+LongestSlip longest_slip(const Contact<D>& contact, const Spring& spring, const WaterShare& water, double overlap,
+                         const EndTouch<D>& touch)
+{
+  const double adheres = 1 / (1 + std::exp(-(overlap + farthest / 2) / 2)); // from nearly 0 at `farthest` to 1
+  const double rises = 1 / (1 + std::exp(-overlap));                        // d depth / d overlap
+  const double stuck = contact.adhesion * touch.area / spring.shear;        // slip at which adhesion alone gives way
+  const double per_depth = contact.friction * spring.stiffness / spring.shear, grains = carried_by_grains(water);
+  return {per_depth * grains * touch.depth + stuck * adheres,
+          per_depth * grains * rises + stuck * adheres * (1 - adheres) / (2 * spring.onset),
+          grains > 0 ? -per_depth * touch.depth * water.per_pressure : 0};
+}
+
 /// The derivatives of a slip that is returned to the cone, s = L t with the direction t of the trial.
 /// @param a          elastic slip at the step's start and the motion of the step
-/// @param longest    L [m]
-/// @param by_radius  dL/dr
 /// @param slip       in: derivative of the trial by the displacement; out: that of the slip
 template <int D>
-void slide(const Vector<D>& a, double longest, double by_radius, const Spring& spring, Matrix<D>& slip,
-           EndTouch<D>& touch)
+void slide(const Vector<D>& a, const LongestSlip& longest, const Spring& spring, Matrix<D>& slip, EndTouch<D>& touch)
 {
   Vector<D> t = tangential<D>(a, touch.normal);
   const double length = norm<D>(t);
   for (int i = 0; i < D; ++i)
   {
     t[i] /= length;
-    touch.by_radius[i] -= spring.shear * by_radius * t[i];
+    touch.by_radius[i] -= spring.shear * longest.by_radius * t[i];
+    touch.by_water[i] = -spring.shear * longest.by_water * t[i];
   }
   const Matrix<D> across = combined<D>(1, identity<D>(), -1, outer<D>(t, t));
-  slip = combined<D>(longest / length, product<D>(across, slip), -by_radius, outer<D>(t, touch.normal));
+  slip = combined<D>(longest.value / length, product<D>(across, slip), -longest.by_radius, outer<D>(t, touch.normal));
 }
 
 /// Area of the surface that a particle covers [m2].
@@ -196,8 +215,9 @@ EndRadius radius_at_end(const Particles<G::dim>& particles, Index p, double volu
 }
 
 template <int D>
-bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring& spring, double radius,
-                    const Vector<D>& x, const Vector<D>& u, const Vector<D>& old, bool tangent, EndTouch<D>& touch)
+bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring& spring, const WaterShare& water,
+                    double radius, const Vector<D>& x, const Vector<D>& u, const Vector<D>& old, bool tangent,
+                    EndTouch<D>& touch)
 {
   const Contact<D>& contact = seen.contact;
   Vector<D> place;
@@ -214,13 +234,10 @@ bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring&
     touch.arm[i] = place[i] - apart * normal[i] - end.displacement[i] - end.centre[i];
   const Relative<D> relative = relative_motion<D>(contact.body, end, u, touch.arm);
   const bool rough = !contact.slip.empty();
-  const double per_depth = contact.friction * spring.stiffness / spring.shear; // of the longest slip
-  const double adheres = 1 / (1 + std::exp(-(overlap + farthest / 2) / 2));    // from nearly 0 at `farthest` to 1
-  const double stuck = contact.adhesion * touch.area / spring.shear;           // slip at which adhesion alone gives way
-  const double longest = per_depth * touch.depth + stuck * adheres;
+  const LongestSlip longest = longest_slip<D>(contact, spring, water, overlap, touch);
   touch.slip = rough ? old : Vector<D>{};
   if (rough)
-    touch.sticks = update_slip<D>(normal, relative.motion, longest, touch.slip);
+    touch.sticks = update_slip<D>(normal, relative.motion, longest.value, touch.slip);
   for (int i = 0; i < D; ++i)
     touch.force[i] = spring.stiffness * touch.depth * normal[i] - spring.shear * touch.slip[i];
   if (!tangent)
@@ -238,7 +255,7 @@ bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring&
     a[i] = old[i] + relative.motion[i];
   Matrix<D> slip = trial_slip_derivative<D>(normal, a, relative.turn, apart, h);
   if (!touch.sticks)
-    slide<D>(a, longest, per_depth * rises + stuck * adheres * (1 - adheres) / (2 * spring.onset), spring, slip, touch);
+    slide<D>(a, longest, spring, slip, touch);
   touch.stiffness = combined<D>(1, touch.stiffness, spring.shear, slip);
   return true;
 }
@@ -269,8 +286,8 @@ EndTouch<D> tied_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spr
   template EndTouch<D> tied_at_end<D>(SeenSurface<D>&, const RigidBody<D>&, const Spring&, const Vector<D>&,           \
                                       const Vector<D>&, const Vector<D>&);                                             \
   template RigidBody<D> body_at_end<D>(const Contact<D>&, const TimeStep&, bool, const Motion<D>&);                    \
-  template bool touches_at_end<D>(SeenSurface<D>&, const RigidBody<D>&, const Spring&, double, const Vector<D>&,       \
-                                  const Vector<D>&, const Vector<D>&, bool, EndTouch<D>&);
+  template bool touches_at_end<D>(SeenSurface<D>&, const RigidBody<D>&, const Spring&, const WaterShare&, double,      \
+                                  const Vector<D>&, const Vector<D>&, const Vector<D>&, bool, EndTouch<D>&);
 INSTANTIATE(2)
 INSTANTIATE(3)
 #undef INSTANTIATE

@@ -5,20 +5,21 @@
 /// A particle moves by u, the body to its place at the step's end. There its gap g, the normal n and the motion w of
 /// the particle relative to the body give
 ///
-///     f = kappa <-g> n - kappa_t s,   |kappa_t s| <= mu kappa <-g> + a A_p h,   <-g> = d ln(1 + exp(-g / d)),
+///     f = kappa <-g> n - kappa_t s,   |kappa_t s| <= mu b kappa <-g> + a A_p h,   <-g> = d ln(1 + exp(-g / d)),
 ///     kappa = 50 beta M A_p / (2 r_p),   kappa_t = 50 beta G A_p / (2 r_p),   d = 1e-5 r_p,
 ///     h = 1 / (1 + exp((g / d - 15) / 2)),
 ///
-/// with the moduli M of compression without lateral strain and G of shear, and the slip s = P (s_0 + w) along the
-/// surface, P = 1 - n n^T, before it is returned to the cone of friction. With beta = 0.2 the springs are ten times as
-/// stiff as the particle in compression and in shear; one as stiff as M along the surface of soil that keeps its
-/// volume, M >> G, would slip and stick in turns from one iteration to the next. A particle that is tied to the body
-/// has the force -kappa s of all its motion relative to it. The radius in g is that at the end, so that the next step
-/// begins with the forces with which this one ends; all else of the size is that at the start. The onset is smooth so
-/// that short enough steps always converge: a kink would look the same to any step. The tangent is that of this force;
-/// the curvature H = dn/dx of the surface is found by differences of its normal.
+/// with the part b of the normal force that the grains carry, 1 without water, and the moduli M of compression without
+/// lateral strain and G of shear, and the slip s = P (s_0 + w) along the surface, P = 1 - n n^T, before it is returned
+/// to the cone of friction. With beta = 0.2 the springs are ten times as stiff as the particle in compression and in
+/// shear; one as stiff as M along the surface of soil that keeps its volume, M >> G, would slip and stick in turns from
+/// one iteration to the next. A particle that is tied to the body has the force -kappa s of all its motion relative to
+/// it. The radius in g is that at the end, so that the next step begins with the forces with which this one ends; all
+/// else of the size is that at the start. The onset is smooth so that short enough steps always converge: a kink would
+/// look the same to any step. The tangent is that of this force; the curvature H = dn/dx of the surface is found by
+/// differences of its normal.
 
-#include "contact/contact.h"
+#include "contact/touch.h"
 
 #include <span>
 
@@ -82,6 +83,7 @@ struct EndTouch
   Vector<D> force{};     ///< on the particle [N]
   Matrix<D> stiffness{}; ///< -df/du at constant radius; where wanted [N/m]
   Vector<D> by_radius{}; ///< df/dr; likewise
+  Vector<D> by_water{};  ///< df/dp of the pore pressure; likewise [m2]
   Vector<D> slip{};      ///< elastic [m]
   Vector<D> arm{};       ///< from the body's centre to the nearest point of its surface, or to a tied particle [m]
   Vector<D> normal{};    ///< of the surface there
@@ -91,14 +93,16 @@ struct EndTouch
 };
 
 /// @param seen    the surface, from the cell of the particle
+/// @param water   its share of the normal force
 /// @param radius  of the particle at the step's end [m]
 /// @param x       place of the particle at the step's start [m]
 /// @param u       its displacement [m]
 /// @param old     elastic slip at the step's start [m]
 /// @returns whether it touches
 template <int D>
-bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring& spring, double radius,
-                    const Vector<D>& x, const Vector<D>& u, const Vector<D>& old, bool tangent, EndTouch<D>& touch);
+bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring& spring, const WaterShare& water,
+                    double radius, const Vector<D>& x, const Vector<D>& u, const Vector<D>& old, bool tangent,
+                    EndTouch<D>& touch);
 
 /// A particle that is tied to the body, as `touches_at_end`.
 /// @param anchor  the point of the body that it is tied to, where it was at the start [m]

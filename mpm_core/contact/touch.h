@@ -84,6 +84,16 @@ Vector<D> tangential(Vector<D> v, const Vector<D>& normal)
   return v;
 }
 
+/// What pore water does to the friction of a particle.
+struct WaterShare
+{
+  double fraction = 0;     ///< of the normal force that the water carries; negative under suction
+  double per_pressure = 0; ///< its derivative by the pore pressure [1/Pa]
+};
+
+/// The part of the normal force by which there is friction: what the grains carry (Terzaghi 1936).
+inline double carried_by_grains(const WaterShare& water) { return std::max(0.0, 1 - water.fraction); }
+
 /// Friction: adds a displacement along the surface to the elastic slip and returns it to the cone.
 /// @param longest  slip at which the spring's force is the shear strength
 /// @returns whether the particle sticks

@@ -2,7 +2,9 @@
 
 #include "contact/clearance.h"
 #include "contact/touch.h"
+#include "contact/water_share.h"
 #include "implicit/driven_bodies.h"
+#include "implicit/pore_water.h"
 #include "model/contacts.h"
 #include "model/material_points.h"
 #include "transfer/affine_field.h"
@@ -39,29 +41,93 @@ void find_touching(const Model<G>& model, SeenSurface<D> seen, const std::vector
     Vector<D> u;
     for (int i = 0; i < D; ++i)
       u[i] = dt * (field.value[i] + dot<D>(field.gradient[i], xi));
-    TouchingParticle<D> found{p,
-                              static_cast<Index>(run.cell),
-                              {},
-                              spring_of<G>(model.particles, p, moduli, seen.contact.penalty),
-                              radius_at_end<G>(model.particles, p, volumetric, u),
+    TouchingParticle<D> found{p,  static_cast<Index>(run.cell),
+                              {}, spring_of<G>(model.particles, p, moduli, seen.contact.penalty),
+                              {}, radius_at_end<G>(model.particles, p, volumetric, u),
                               u};
     bool touches = bonds;
     if (bonds)
       found.touch = tied_at_end<D>(seen, trial.end, found.spring, x, u, anchor_of<D>(*bonds, p));
     else
-      touches = touches_at_end<D>(seen, trial.end, found.spring, found.radius.value, x, u, slip_of<D>(slips, p),
-                                  tangents, found.touch);
+      touches = touches_at_end<D>(seen, trial.end, found.spring, found.water, found.radius.value, x, u,
+                                  slip_of<D>(slips, p), tangents, found.touch);
     if (touches)
       trial.touching.push_back(found);
   }
 }
 
-/// Adds the stiffness of a particle to what touches in its cell.
+/// Pore pressure at a point of a surface beside the soil of a cell, less that of standing water. No water flows through
+/// the surface, so that across it the pressure has the gradient of the water's weight.
+template <class G>
+double pressure_at_surface(const Model<G>& model, const ImplicitStep<G>& step, Index cell, const Vector<G::dim>& point,
+                           const Vector<G::dim>& normal)
+{
+  constexpr int D = G::dim;
+  const PoreStep<D>& pore = step.pore;
+  const CellMoments<G>& moments = model.fields.front().moments[cell];
+  double distance = 0, gradient = 0; // of the middle of the soil, and along the normal
+  for (int a = 0; a < D; ++a)
+  {
+    distance += (model.mesh.shapes[cell].centre[a] + moments.mass_xi[a] / moments.mass - point[a]) * normal[a];
+    gradient += (pore.density * pore.gravity[a] - pore.cells[cell].load.gradient[a]) * normal[a];
+  }
+  return pressure_sum(model.mesh, step, cell) / volume_of(pore.cells[cell]) - distance * gradient;
+}
+
+/// Normal forces and areas of the particles that touch a surface at the nodes, of this rank.
 template <class G, int D = G::dim>
-void add_stiffness(const TouchingParticle<D>& at_surface, const std::array<double, D + 1>& weights,
-                   CellContact<D>& in_cell)
+std::vector<PressedNode<D>> pressed_nodes(const Model<G>& model, const TrialContact<D>& trial)
+{
+  std::vector<PressedNode<D>> nodes(model.mesh.points.size(), PressedNode<D>{});
+  for (const TouchingParticle<D>& at_surface : trial.touching)
+  {
+    const EndTouch<D>& touch = at_surface.touch;
+    const auto weights =
+        weights_at<D>(model.mesh.shapes[at_surface.cell], at<D>(model.particles.position, at_surface.particle));
+    for (int k = 0; k <= D; ++k)
+    {
+      PressedNode<D>& node = nodes[model.mesh.cells[at_surface.cell][k]];
+      node.area += weights[k] * touch.area;
+      for (int a = 0; a < D; ++a)
+        node.force[a] += weights[k] * at_surface.spring.stiffness * touch.depth * touch.normal[a];
+    }
+  }
+  return nodes;
+}
+
+/// Takes from the friction of a surface what the pore water carries of the normal forces.
+/// @note Collective
+template <class G, int D = G::dim>
+void share_with_water(Model<G>& model, const ImplicitStep<G>& step, double travelled, bool tangents,
+                      const Contact<D>& contact, TrialContact<D>& trial)
+{
+  const Mesh<D>& mesh = model.mesh;
+  const std::vector<double> areas =
+      contact::areas_per_force<D>(mesh, model.exchange, step.cells, step.pore.around, pressed_nodes(model, trial));
+  const auto* slips = columns_of(model.particles, contact.slip);
+  for (auto& [p, cell, touch, spring, water, radius, u] : trial.touching)
+  {
+    const Vector<D> x = at<D>(model.particles.position, p);
+    const auto weights = weights_at<D>(mesh.shapes[cell], x);
+    water.per_pressure = 0;
+    for (int k = 0; k <= D; ++k)
+      water.per_pressure += weights[k] * areas[mesh.cells[cell][k]];
+    Vector<D> point = touch.arm;
+    for (int a = 0; a < D; ++a)
+      point[a] += contact.body.centre[a] + trial.end.displacement[a];
+    water.fraction = water.per_pressure * pressure_at_surface<G>(model, step, cell, point, touch.normal);
+    SeenSurface<D> seen = seen_from(contact, cell, travelled + norm<D>(u));
+    touches_at_end<D>(seen, trial.end, spring, water, radius.value, x, u, slip_of<D>(slips, p), tangents, touch);
+  }
+}
+
+/// Adds the derivatives of the force on a particle to those of all that touch in its cell.
+template <class G, int D = G::dim>
+void add_derivatives(const TouchingParticle<D>& at_surface, const PoreStep<D>& pore,
+                     const std::array<double, D + 1>& weights, CellContact<D>& in_cell)
 {
   const EndTouch<D>& touch = at_surface.touch;
+  const Index cell = at_surface.cell;
   Matrix<D> stiffness = touch.stiffness;
   for (int i = 0; i < D; ++i)
     stiffness[i][0] -= touch.by_radius[i] * at_surface.radius.by_motion;
@@ -73,15 +139,23 @@ void add_stiffness(const TouchingParticle<D>& at_surface, const std::array<doubl
         for (int j = 0; j < D; ++j)
           in_cell.blocks[k][l][i][j] += weights[k] * weights[l] * stiffness[i][j];
     }
+  for (int l = 0; l <= D && pore.flows; ++l)
+  {
+    const double by_node = pressure_by_node(pore, cell, l) / volume_of(pore.cells[cell]);
+    for (int k = 0; k <= D; ++k)
+      for (int a = 0; a < D; ++a)
+        in_cell.by_water[k][l][a] += weights[k] * touch.by_water[a] * by_node;
+  }
 }
 
-/// Adds the particles' forces, and their blocks, to the nodes of a cell.
+/// Adds the particles' forces, and their blocks, to the nodes of their cells.
 template <class G, int D = G::dim>
-void scatter(const Model<G>& model, Index cell, std::span<const TouchingParticle<D>> particles, bool tangents,
-             ContactStep<D>& step)
+void scatter(const Model<G>& model, std::span<const TouchingParticle<D>> particles, bool tangents,
+             const PoreStep<D>& pore, ContactStep<D>& step)
 {
   for (const TouchingParticle<D>& at_surface : particles)
   {
+    const Index cell = at_surface.cell;
     const auto weights = weights_at<D>(model.mesh.shapes[cell], at<D>(model.particles.position, at_surface.particle));
     for (std::size_t k = 0; k <= D; ++k)
       for (int i = 0; i < D; ++i)
@@ -93,31 +167,33 @@ void scatter(const Model<G>& model, Index cell, std::span<const TouchingParticle
       step.number_of_cell[cell] = static_cast<Index>(step.cells.size());
       step.cells.push_back({});
     }
-    add_stiffness<G>(at_surface, weights, step.cells[static_cast<std::size_t>(step.number_of_cell[cell])]);
+    add_derivatives<G>(at_surface, pore, weights, step.cells[static_cast<std::size_t>(step.number_of_cell[cell])]);
   }
 }
 
-/// Finds what touches all surfaces when the nodes move with a velocity, and the forces at nodes.
-/// @param strains  of the cells
+/// Finds what touches all surfaces under the iterate, and the forces at nodes.
+/// @note Collective where there is pore water
 template <class G, int D = G::dim>
-void find_contacts(Model<G>& model, std::span<const Vector<D>> velocity, const std::vector<CellStrain<D>>& strains,
-                   const TimeStep& time, bool at_rest, bool tangents, const DrivenBodies<D>& bodies,
-                   ContactStep<D>& step)
+void find_contacts(Model<G>& model, bool tangents, ImplicitStep<G>& step)
 {
-  step.surfaces.resize(model.contacts.size());
-  step.forces.assign(model.mesh.points.size(), {});
-  step.cells.clear();
-  step.number_of_cell.assign(static_cast<std::size_t>(model.mesh.owned_cells), none);
+  const std::span<const Vector<D>> velocity = model.fields.front().velocity;
+  const TimeStep time{step.time, step.dt};
+  ContactStep<D>& found = step.contact;
+  found.surfaces.resize(model.contacts.size());
+  found.forces.assign(model.mesh.points.size(), {});
+  found.cells.clear();
+  found.number_of_cell.assign(static_cast<std::size_t>(model.mesh.owned_cells), none);
   for (std::size_t k = 0; k < model.contacts.size(); ++k)
   {
     Contact<D>& contact = model.contacts[k];
     keep_clearance<D>(model.mesh, contact);
-    TrialContact<D>& trial = step.surfaces[k];
-    trial.end = body_at_end<D>(contact, time, at_rest, driven_motion<D>(bodies, k));
+    TrialContact<D>& trial = found.surfaces[k];
+    trial.end = body_at_end<D>(contact, time, step.options.at_rest, driven_motion<D>(step.bodies, k));
     trial.touching.clear();
     const auto* slips = columns_of(model.particles, contact.slip);
     const auto* tied = columns_of(model.particles, contact.bond);
     const double travelled = contact.travel + step_travel(contact, trial.end, time.dt);
+    const bool wet = !step.pore.cells.empty() && contact.friction > 0;
     for (const Run& run : model.order.runs)
     {
       const auto cell = static_cast<std::size_t>(run.cell);
@@ -125,12 +201,13 @@ void find_contacts(Model<G>& model, std::span<const Vector<D>> velocity, const s
       const Extremes extremes = extremes_of<G, D>(model.mesh, run, velocity, time.dt, model.particles);
       if (!may_be_near<D>(extremes, gap))
         continue;
-      const std::size_t before = trial.touching.size();
       const SeenSurface<D> seen = seen_from(contact, static_cast<Index>(run.cell), travelled + extremes.motion);
-      find_touching<G, D>(model, seen, slips, run, tied, velocity, time.dt, strains[cell].volumetric, tangents, trial);
-      scatter<G, D>(model, run.cell, std::span<const TouchingParticle<D>>(trial.touching).subspan(before), tangents,
-                    step);
+      find_touching<G, D>(model, seen, slips, run, tied, velocity, time.dt, step.strains[cell].volumetric,
+                          tangents && !wet, trial);
     }
+    if (wet)
+      share_with_water(model, step, travelled, tangents, contact, trial);
+    scatter<G, D>(model, trial.touching, tangents, step.pore, found);
   }
 }
 } // namespace
@@ -141,8 +218,7 @@ void try_contacts(Model<G>& model, bool tangents, ImplicitStep<G>& step)
   if (model.contacts.empty())
     step.contact = {};
   else
-    find_contacts<G, G::dim>(model, model.fields.front().velocity, step.strains, {step.time, step.dt},
-                             step.options.at_rest, tangents, step.bodies, step.contact);
+    find_contacts<G>(model, tangents, step);
 }
 
 template <class G, int D>
@@ -162,7 +238,7 @@ void add_contact_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, Tange
   for (Index c : step.cells) // also those where nothing touches, so that the order of entries is always the same
   {
     const CellContact<D>* in_cell = step.contact.in(c);
-    const auto& [blocks, by_volumetric] = in_cell ? *in_cell : nothing;
+    const auto& [blocks, by_volumetric, by_water] = in_cell ? *in_cell : nothing;
     for (std::size_t l = 0; l <= D; ++l)
     {
       const Vector<D> dilates =
@@ -174,6 +250,9 @@ void add_contact_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, Tange
           for (int j = 0; j < D; ++j)
             block[i][j] += by_volumetric[k][i] * dilates[j];
         tangent.add(mesh.cells[c][k], mesh.cells[c][l], block);
+        if (step.pore.flows)
+          tangent.add_coupled(mesh.cells[c][k], mesh.cells[c][l],
+                              column_of_pressure<D>(step.pore, mesh.cells[c][l], by_water[k][l]), {}, 0);
       }
     }
   }
@@ -190,7 +269,7 @@ void keep_slip(Model<G>& model, const ImplicitStep<G>& step)
     auto* slips = columns_of(model.particles, contact.slip);
     for (std::size_t i = 0; slips && i < D; ++i)
       std::ranges::fill((*slips)[i], 0.0);
-    for (const auto& [p, cell, touch, spring, radius, u] : step.contact.surfaces[k].touching)
+    for (const auto& [p, cell, touch, spring, water, radius, u] : step.contact.surfaces[k].touching)
     {
       for (std::size_t i = 0; slips && i < D; ++i)
         (*slips)[i][p] = touch.slip[i];

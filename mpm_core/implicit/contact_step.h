@@ -13,6 +13,7 @@ struct TouchingParticle
   Index particle, cell;
   EndTouch<D> touch;
   Spring spring;
+  WaterShare water;
   EndRadius radius;
   Vector<D> displacement; ///< in the step [m]
 };
@@ -32,6 +33,7 @@ struct CellContact
 {
   std::array<std::array<Matrix<D>, D + 1>, D + 1> blocks{}; ///< -df/du between vertices, at constant volumetric strain
   std::array<Vector<D>, D + 1> by_volumetric{};             ///< -df/d theta of the vertices, by that strain of the cell
+  std::array<std::array<Vector<D>, D + 1>, D + 1> by_water{}; ///< df/dp of the first by the pressure of the second
 };
 
 /// An axis along which forces move a body, or about which they rotate it; see driven_bodies.h.

@@ -194,7 +194,7 @@ void add_rotating(Model<G>& model, std::size_t first, std::size_t last, Implicit
       EndTouch<D> touch;
       if (bonds)
         return tied_at_end<D>(seen, end, particle.spring, x, u, anchor_of<D>(*bonds, p));
-      touches_at_end<D>(seen, end, particle.spring, radius, x, u, old, false, touch);
+      touches_at_end<D>(seen, end, particle.spring, particle.water, radius, x, u, old, false, touch);
       return touch;
     };
     const auto by = derivatives_about<D>(trial.end, ends, particle, axes, length, touch_at);

@@ -109,12 +109,12 @@ TrialReport find_residual(Model<G>& model, ImplicitStep<G>& step, bool tangents)
   const auto count = try_stresses(mesh, points_of(model, step), field, tangents, step);
   if (step.options.average_stress)
     average_stresses<G>(mesh, exchange, field, step.stress);
-  try_contacts(model, tangents, step);
-  balance_bodies(model, tangents, step);
   if (step.pore.flows)
     update(step.halos.nodes, step.pore.rate);
   if (model.water && model.water->may_dry())
     try_drying(mesh, model.particles, step.runs, field, *model.water, step);
+  try_contacts(model, tangents, step);
+  balance_bodies(model, tangents, step);
   // Residual: each term adds its forces at the nodes, this rank's part (I3)
   step.forces.assign(field.nodes.size(), {});
   add_external_forces(step, exchange.owned, step.forces);

@@ -1,5 +1,6 @@
 #include "implicit/pore_preparation.h"
 
+#include "contact/clearance.h"
 #include "implicit/pore_surface.h"
 #include "implicit/pore_water.h"
 #include "model/anisotropy.h"
@@ -235,19 +236,33 @@ void hold_pressures(const Model<G>& model, NodeExchange& exchange, ImplicitStep<
   }
 }
 
+/// Where the surface of the soil is.
+/// @note Collective
+template <class G, int D = G::dim>
+void find_soil_around(const Mesh<D>& mesh, NodeExchange& exchange, const VelocityField<G>& field, ImplicitStep<G>& step)
+{
+  PoreStep<D>& pore = step.pore;
+  pore.around.assign(mesh.points.size(), SoilAround<D>{});
+  for (Index c : step.cells)
+    for (int k = 0; k <= D; ++k)
+    {
+      SoilAround<D>& node = pore.around[mesh.cells[c][k]];
+      node.cells += 1;
+      for (int a = 0; a < D; ++a)
+        node.outward[a] += field.moments[c].volume * dilation_gradient<G>(mesh.shapes[c], k)[a];
+    }
+  sum_shared(exchange, pore.around);
+}
+
 /// Whether nothing determines the pressure: none is prescribed, and a uniform change of it does no work on the
 /// displacements that supports leave free.
 /// @note Collective
 template <class G, int D = G::dim>
-bool pressure_is_free(const Mesh<D>& mesh, NodeExchange& exchange, const VelocityField<G>& field,
-                      const ImplicitStep<G>& step, bool drained)
+bool pressure_is_free(NodeExchange& exchange, const VelocityField<G>& field, const ImplicitStep<G>& step, bool drained)
 {
-  std::vector<Vector<D>> work(mesh.points.size(), Vector<D>{});
-  for (Index c : step.cells)
-    for (int k = 0; k <= D; ++k)
-      for (int a = 0; a < D; ++a)
-        work[mesh.cells[c][k]][a] += field.moments[c].volume * dilation_gradient<G>(mesh.shapes[c], k)[a];
-  sum_shared(exchange, work);
+  std::vector<Vector<D>> work;
+  for (const SoilAround<D>& node : step.pore.around)
+    work.push_back(node.outward);
   std::array<double, 3> largest{}; // held, work, that which supports leave
   const auto note = [&](std::size_t entry)
   {
@@ -278,6 +293,9 @@ void start_pore_water(Model<G>& model, ImplicitStep<G>& step)
   if (!model.water)
     return;
   std::vector<NodalWater> nodes = sum_particles(model, step);
+  find_soil_around(model.mesh, model.exchange, model.fields.front(), step);
+  pore.gravity = gravity_at(model, model.time + step.dt);
+  pore.density = model.water->density;
   if (step.options.at_rest)
     return;
   sum_shared(model.exchange, nodes);
@@ -292,19 +310,21 @@ void start_pore_water(Model<G>& model, ImplicitStep<G>& step)
     }
   pore.drained = model.water->drained_surface;
   if (pore.drained)
-    find_surface(model.mesh, model.exchange, nodes, *model.water, step);
+  {
+    for (auto& contact : model.contacts)
+      keep_clearance<G::dim>(model.mesh, contact);
+    find_surface<G, G::dim>(model.mesh, model.exchange, nodes, *model.water, model.contacts, step);
+  }
   update(step.halos.nodes, pore.start);
   weigh_ghosts(nodes, step);
   pore.flows = true;
-  pore.gravity = gravity_at(model, model.time + step.dt);
-  pore.density = model.water->density;
   pore.unit = 0;
   for (const Law& law : model.laws)
     pore.unit = std::max(pore.unit, p_wave_modulus(law));
   hold_pressures(model, model.exchange, step);
   impose_pressures(step.dt, pore);
   if (std::isinf(model.water->modulus) && !model.water->may_dry() &&
-      pressure_is_free(model.mesh, model.exchange, model.fields.front(), step, model.water->drained_surface))
+      pressure_is_free(model.exchange, model.fields.front(), step, model.water->drained_surface))
     throw InputError("no pore pressure is prescribed, the water is incompressible and supports are all around: the "
                      "pressure is undetermined; prescribe one by hold_pore_pressure(), or let water be compressible");
 }

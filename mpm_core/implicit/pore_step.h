@@ -2,6 +2,7 @@
 /// @file
 /// The pore water of an implicit step, as plain data; docs/implicit.md has the equations (W1) to (W4).
 
+#include "contact/water_share.h"
 #include "model/pore_forces.h"
 
 #include <numeric>
@@ -68,12 +69,13 @@ struct PoreStep
   std::vector<PoreCell<D>> cells;    ///< of each owned cell
   std::vector<DryingCell<D>> drying; ///< likewise, under the iterate; empty where all soil stays saturated
   std::vector<SurfacePoint<D>> surface;
-  std::vector<double> ghosts;      ///< weight of each stabilised facet [m5/Pa]
-  std::vector<double> start;       ///< pressure of each node at the start [Pa]
-  std::vector<double> rate;        ///< of the iterate [Pa/s]
-  std::vector<unsigned char> held; ///< per node: 1 where its pressure is prescribed
-  std::vector<double> prescribed;  ///< that pressure [Pa]
-  std::vector<double> content;     ///< water that the soil takes up less what flows to it [m3], over all ranks
+  std::vector<SoilAround<D>> around; ///< of each node: the surface of the soil
+  std::vector<double> ghosts;        ///< weight of each stabilised facet [m5/Pa]
+  std::vector<double> start;         ///< pressure of each node at the start [Pa]
+  std::vector<double> rate;          ///< of the iterate [Pa/s]
+  std::vector<unsigned char> held;   ///< per node: 1 where its pressure is prescribed
+  std::vector<double> prescribed;    ///< that pressure [Pa]
+  std::vector<double> content;       ///< water that the soil takes up less what flows to it [m3], over all ranks
 };
 
 /// Water that a gradient drives through the soil of a cell, against another one: g . f h.

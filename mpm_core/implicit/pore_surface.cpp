@@ -1,5 +1,7 @@
 #include "implicit/pore_surface.h"
 
+#include "contact/clearance.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -162,9 +164,28 @@ void add_at_nodes(const Mesh<D>& mesh, const SurfacePoint<D>& point, ImplicitSte
 }
 } // namespace
 
+namespace
+{
+/// Distance up to which a rigid surface covers one of the soil, over the size of the cells: that is as well as the
+/// place of the latter is known.
+constexpr double covered = 0.5;
+
+/// Whether a rigid surface, which lets no water through, is where a point of the free surface of a cell is.
+template <int D>
+bool is_covered(std::span<const Contact<D>> contacts, Index cell, const Vector<D>& x, double size)
+{
+  const auto covers = [&](const Contact<D>& contact)
+  {
+    return may_be_near(contact.bounds[static_cast<std::size_t>(cell)], contact.travel + size) &&
+           contact::distance<D>(contact.surface, as_at_start<D>(contact.body, x)).value < covered * size;
+  };
+  return std::ranges::any_of(contacts, covers);
+}
+} // namespace
+
 template <class G, int D>
 void find_surface(const Mesh<D>& mesh, NodeExchange& exchange, std::span<const NodalWater> nodes,
-                  const PoreWater& water, ImplicitStep<G>& step)
+                  const PoreWater& water, std::span<const Contact<D>> contacts, ImplicitStep<G>& step)
 {
   const std::vector<double> d = distances<G>(mesh, exchange, nodes, step);
   const double rain = water.rain.empty() ? 0 : step.dt * value_at(water.rain, water.time);
@@ -181,7 +202,10 @@ void find_surface(const Mesh<D>& mesh, NodeExchange& exchange, std::span<const N
     const double plan = rain > 0 ? area * upward(mesh, c, of_cell) : 0;
     for (int i = 0; i < cut.count; ++i)
     {
-      const double standing = standing_pressure(water, point_in_cell<D>(mesh, c, cut.points[i])[D - 1]);
+      const Vector<D> x = point_in_cell<D>(mesh, c, cut.points[i]);
+      if (is_covered<D>(contacts, c, x, cell_size<D>(mesh.shapes[c].volume)))
+        continue;
+      const double standing = standing_pressure(water, x[D - 1]);
       const bool open = standing > 0 || !water.may_dry();
       const double weight = area * outflow_per_area(mesh, step, nodes, c);
       SurfacePoint<D> point{c, cut.points[i], weight, standing, rain * plan, open, false};
@@ -215,7 +239,7 @@ bool revise_surface(const Mesh<D>& mesh, MPI_Comm comm, ImplicitStep<G>& step)
 
 #define INSTANTIATE(G)                                                                                                 \
   template void find_surface(const Mesh<G::dim>&, NodeExchange&, std::span<const NodalWater>, const PoreWater&,        \
-                             ImplicitStep<G>&);                                                                        \
+                             std::span<const Contact<G::dim>>, ImplicitStep<G>&);                                      \
   template bool revise_surface(const Mesh<G::dim>&, MPI_Comm, ImplicitStep<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

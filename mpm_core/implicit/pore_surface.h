@@ -15,14 +15,14 @@
 
 namespace mpm::implicit
 {
-/// Finds the points of the free surface in the cells that it cuts.
+/// Finds the points of the free surface in the cells that it cuts, but for those that rigid surfaces cover.
 ///
 /// Where it is in cells without particles next to them, rain falls on the nodes that these share.
-/// @pre flux and compliance of the cells are known
+/// @pre flux and compliance of the cells are known, and bounds of the contacts
 /// @note Collective
 template <class G, int D = G::dim>
 void find_surface(const Mesh<D>& mesh, NodeExchange& exchange, std::span<const NodalWater> nodes,
-                  const PoreWater& water, ImplicitStep<G>& step);
+                  const PoreWater& water, std::span<const Contact<D>> contacts, ImplicitStep<G>& step);
 
 /// Lets points of the surface that take all the rain have outflow where the pressure under the iterate is too high for
 /// that, and the others take the rain where they take up more than that.

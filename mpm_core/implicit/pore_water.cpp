@@ -48,11 +48,8 @@ double volume_strain(const Mesh<D>& mesh, const VelocityField<G>& field, double 
   return strain;
 }
 
-namespace
-{
-/// Sum V (S_e p - p_s) of a cell under the iterate.
-template <class G, int D = G::dim>
-double pressure_of(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c)
+template <class G, int D>
+double pressure_sum(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c)
 {
   if (!step.pore.drying.empty())
     return step.pore.drying[c].pressure;
@@ -62,6 +59,8 @@ double pressure_of(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c)
   return pressure;
 }
 
+namespace
+{
 template <class G, int D = G::dim>
 void add_surface_content(const Mesh<D>& mesh, const ImplicitStep<G>& step, std::vector<double>& content)
 {
@@ -96,7 +95,7 @@ void add_pore_forces(const Mesh<D>& mesh, const ImplicitStep<G>& step, std::vect
   for (Index c : step.cells)
   {
     const PoreCell<D>& cell = step.pore.cells[c];
-    const double pressure = pressure_of(mesh, step, c);
+    const double pressure = pressure_sum(mesh, step, c);
     for (int k = 0; k <= D; ++k)
     {
       const Vector<D> dilation = dilation_gradient<G>(mesh.shapes[c], k);
@@ -181,11 +180,12 @@ void add_cell_block(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c, c
   const double inertia = step.options.quasi_static
                              ? 0
                              : pore.density * cell.mean[l] / (volume * step.stage.weight * step.stage.dt * step.dt);
-  Vector<D> forces = dilation_gradient<G>(shape, k), volumes = dilation_gradient<G>(shape, l);
+  const Vector<D> dilation = dilation_gradient<G>(shape, k);
+  Vector<D> by_own, volumes = dilation_gradient<G>(shape, l);
   const Vector<D> outflow = product<D>(flux, shape.gradient[k]);
   for (int a = 0; a < D; ++a)
   {
-    forces[a] *= pore.held[column] ? 0 : -unit * (dries ? pore.drying[c].by_pressure[l] : cell.mean[l]);
+    by_own[a] = pressure_by_node(pore, c, l) * dilation[a];
     const double wet = !dries             ? cell.mean[k]
                        : step.options.nmd ? 0
                                           : pore.drying[c].wet[k]; // averaged: see averaging.h
@@ -199,7 +199,7 @@ void add_cell_block(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index c, c
   double by_pressure = -unit * unit * water;
   if (pore.held[row] || pore.held[column])
     by_pressure = row == column ? -unit * cell.mean[k] : 0;
-  tangent.add_coupled(row, column, forces, volumes, by_pressure);
+  tangent.add_coupled(row, column, column_of_pressure<D>(pore, column, by_own), volumes, by_pressure);
 }
 
 /// The ghost penalty of the pressures.
@@ -258,6 +258,7 @@ template void impose_pressures(double, PoreStep<3>&);
                                            Index);                                                                     \
   template void add_pore_forces(const Mesh<G::dim>&, const ImplicitStep<G>&, std::vector<NodalForces<G::dim>>&);       \
   template void find_water_balance(const Mesh<G::dim>&, NodeExchange&, const VelocityField<G>&, ImplicitStep<G>&);     \
+  template double pressure_sum(const Mesh<G::dim>&, const ImplicitStep<G>&, Index);                                    \
   template double volume_strain(const Mesh<G::dim>&, const VelocityField<G>&, double, Index);                          \
   template void add_pore_entries(const Mesh<G::dim>&, const VelocityField<G>&, const ImplicitStep<G>&,                 \
                                  TangentSum<G::dim>&);

@@ -20,6 +20,26 @@
 
 namespace mpm::implicit
 {
+/// Sum V (S_e p - p_s) of a cell under the iterate: the pore pressure in the total stress [N m].
+template <class G, int D = G::dim>
+double pressure_sum(const Mesh<D>& mesh, const ImplicitStep<G>& step, Index cell);
+
+/// Its derivative by the pressure of a vertex [m3].
+template <int D>
+inline double pressure_by_node(const PoreStep<D>& pore, Index cell, int vertex)
+{
+  return pore.drying.empty() ? pore.cells[cell].mean[vertex] : pore.drying[cell].by_pressure[vertex];
+}
+
+/// The tangent's column for the pressure of a node, from the derivative of forces on the soil by that pressure.
+template <int D>
+inline Vector<D> column_of_pressure(const PoreStep<D>& pore, Index node, Vector<D> derivative)
+{
+  for (double& component : derivative)
+    component *= pore.held[node] ? 0 : -pore.unit;
+  return derivative;
+}
+
 /// Adds the forces of the pore pressures under the iterate to the internal ones; this rank's part.
 template <class G, int D = G::dim>
 void add_pore_forces(const Mesh<D>& mesh, const ImplicitStep<G>& step, std::vector<NodalForces<D>>& forces);

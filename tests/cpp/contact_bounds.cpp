@@ -163,8 +163,8 @@ TEST(ContactBounds, TouchesAtTheEndOfAStep)
     const double radius = particle_radius<Solid>(particles, p);
     SeenSurface<3> near = seen_from(contact, particles.cell[p], motion), all{contact, {}, 0, -1};
     EndTouch<3> quick, thorough;
-    const bool touches = touches_at_end<3>(near, end, spring, radius, x, u, {}, true, quick);
-    ASSERT_EQ(touches, touches_at_end<3>(all, end, spring, radius, x, u, {}, true, thorough));
+    const bool touches = touches_at_end<3>(near, end, spring, {}, radius, x, u, {}, true, quick);
+    ASSERT_EQ(touches, touches_at_end<3>(all, end, spring, {}, radius, x, u, {}, true, thorough));
     ASSERT_EQ(quick.force, thorough.force);
     ASSERT_EQ(quick.stiffness, thorough.stiffness);
     ASSERT_EQ(quick.arm, thorough.arm);

@@ -44,7 +44,8 @@ class ContactMethods:
         Args:
             surface: a `Plane`, `Box`, `Disc`, `Sphere`, `Cylinder`, `Cone`, `Wedge`, `Polyline` or `Triangles` at its present
                 position, outside all particles.
-            friction: coefficient mu of Coulomb friction [-], the tangent of the angle of friction; 0 is smooth.
+            friction: coefficient mu of Coulomb friction [-], the tangent of the angle of friction; 0 is smooth. In soil with pore
+                water it acts by the effective stress.
             adhesion: shear strength of the contact without pressure [Pa], for instance that of the soil on a rough footing;
                 it acts only where the soil touches the surface, and does not resist tension.
             velocity: of the centre [m/s], shape (D,); or (times [s], velocities (n, D)), linear in between and constant

@@ -42,6 +42,67 @@ def test_a_column_on_a_plane_consolidates_as_terzaghi_has_it(friction):
     assert max(iterations) <= 4
 
 
+# --- friction: by the effective stress ---------------------------------------------------------------------------------
+
+MU = 0.4
+
+
+def sliding_base(base):
+    """A column 0.4 m wide, 1 m high, between smooth walls on a rough plane that moves sideways at some height of the mesh."""
+    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (0.4, 1.2), (4, 12))
+    model = mpm.Model(bridge.background_mesh(domain, None, facet_tags), ELASTIC)
+    x = 0.05 * (np.indices((8, 20)).reshape(2, -1).T + 0.5) + (0.0, base)
+    model.seed_points(x, np.full(len(x), 0.05**2), density=2000.0)
+    for side in (1, 2):
+        model.roller(side, (1, 0))
+    plane = model.add_contact(mpm.Plane((0, base - 1e-12), normal=(0, 1)), friction=MU, velocity=(1e-4, 0.0))
+    model.add_water(porosity=0.4, conductivity=1e-4, modulus=np.inf, drained_surface=True)
+    return model, plane
+
+
+@pytest.mark.parametrize("water", [0.0, 4e3, 9e3, -4e3])
+def test_a_surface_rubs_by_the_load_less_the_pore_pressure(water):
+    """A total load q on a column with the pore pressure u: the shear stress is mu (q - u), also under suction. The particles
+    are not on a grid, and cover only 0.8 of the plane."""
+    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (0.4, 1.0), (4, 10))
+    model = mpm.Model(bridge.background_mesh(domain, None, facet_tags), ELASTIC)
+    model.seed(density=2000.0, per_cell=3)
+    for side in (1, 2):
+        model.roller(side, (1, 0))
+    gap = model.gap(mpm.Plane((0, 0), normal=(0, 1)))
+    base = model.add_contact(mpm.Plane((0, gap - 1e-12), normal=(0, 1)), friction=MU, velocity=(1e-4, 0.0))
+    model.add_water(porosity=0.4, conductivity=1e-4, modulus=np.inf)
+    model.hold_pore_pressure(4, water)
+    model.press_surface(4, 10e3)
+    reports = list(model.implicit(40.0, dt=4.0, quasi_static=True))
+    assert -base.force[1] == pytest.approx(0.4 * 10e3, rel=1e-6)
+    assert -base.force[0] == pytest.approx(0.4 * MU * (10e3 - water), rel=1e-3)
+    assert max(report.iterations for report in reports) <= 6
+
+
+@pytest.mark.parametrize("integration", [mpm.Integration.PARTICLES, mpm.Integration.MIXED])
+@pytest.mark.parametrize("base", [0.0, 0.03, 0.06, 0.09])
+def test_a_column_under_its_weight_rubs_by_its_submerged_weight(base, integration):
+    """Of the weight 20 kPa the water carries 10 kPa at the plane, which need not follow the mesh. The water table is known
+    to 5 % of a cell per cell that the surface cuts, 0.5 kPa."""
+    model, plane = sliding_base(base)
+    model.set_gravity((0.0, -10.0))
+    model.implicit(40.0, dt=4.0, quasi_static=True, integration=integration).last()
+    normal, shear = -plane.force[1] / 0.4, -plane.force[0] / 0.4
+    assert normal == pytest.approx(20e3, rel=1e-3)
+    assert normal - shear / MU == pytest.approx(10e3, abs=0.5e3)
+
+
+def test_water_that_stands_over_the_soil_presses_on_a_surface_without_friction():
+    model, plane = sliding_base(0.03)
+    model.set_gravity((0.0, -10.0))
+    model.stand_water(2.0)
+    model.implicit(40.0, dt=4.0, quasi_static=True).last()
+    assert model.particles.pore_pressure.max() > 19e3
+    assert -plane.force[1] / 0.4 == pytest.approx(10e3, rel=1e-6)  # both sides of the plane are under water
+    assert -plane.force[0] / 0.4 == pytest.approx(MU * 10e3, rel=2e-3)
+
+
 def layer_under_a_plate(water, comm=MPI.COMM_WORLD, law=ELASTIC):
     """A layer between smooth walls on a rough base, under a rough plate that carries a load."""
     domain, _, facet_tags = bridge.box_mesh(comm, (3.0, 2.0), (13, 9))
@@ -69,7 +130,7 @@ def test_the_settlement_of_a_loaded_plate_becomes_that_of_drained_soil():
     assert abs(wet.particles.pore_pressure).max() < 20.0
     assert on_wet.force[1] == pytest.approx(20e3, rel=1e-8)
     assert on_wet.displacement[1] == pytest.approx(on_dry.displacement[1], rel=0.02)
-    assert max(at_once + later) <= 8
+    assert at_once[0] <= 9 and max(at_once[1:] + later) <= 8
 
 
 def test_positions_that_are_held_have_no_contact():
