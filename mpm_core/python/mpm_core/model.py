@@ -355,7 +355,7 @@ class Model(ContactMethods, Body):
         core_conversion = checked_conversion(self, conversion, integration)
         require_particles(self)
         require_new_soil_outside(self)
-        warn_of_setup(self, nmd)
+        warn_of_setup(self, nmd, until=until)
         reports = run_implicit(
             self, method, options, times=times, dt=longest, watch=watch, every_steps=steps, rebalance=threshold,
             energy_limit=limit, accuracy=wanted, conversion=core_conversion,

@@ -1,5 +1,7 @@
 """Saturated soil on rigid surfaces, which let no water through, in implicit steps: the contact carries total stresses."""
 
+import warnings
+
 import numpy as np
 import pytest
 from consolidation_cases import GRAVITY_OF_WATER
@@ -101,6 +103,18 @@ def test_water_that_stands_over_the_soil_presses_on_a_surface_without_friction()
     assert model.particles.pore_pressure.max() > 19e3
     assert -plane.force[1] / 0.4 == pytest.approx(10e3, rel=1e-6)  # both sides of the plane are under water
     assert -plane.force[0] / 0.4 == pytest.approx(MU * 10e3, rel=2e-3)
+
+
+def test_a_run_in_which_no_water_flows_through_a_cell_warns_of_its_friction():
+    """The time h^2 / c_v of cells of 0.1 m, c_v = k M / gamma_w."""
+    model, _ = sliding_base(0.03)
+    time = 0.1**2 * GRAVITY_OF_WATER / (1e-4 * ELASTIC.p_wave_modulus)
+    with pytest.warns(RuntimeWarning, match=f"needs {time:.3g} s to flow through a cell .* uncertain by half"):
+        model.implicit(0.9 * time, dt=time, quasi_static=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model.set_gravity((0.0, -10.0))
+        model.implicit(1.1 * time, dt=time, quasi_static=True)
 
 
 def layer_under_a_plate(water, comm=MPI.COMM_WORLD, law=ELASTIC):
