@@ -42,14 +42,14 @@ class EnergyWatch:
     Args:
         limit: unexplained energy over the largest energy at work so far, at which the run ends with an error; None for none.
         speaks: whether this rank issues the warning.
-        advice: what its text ends with; called on all ranks alike.
+        advice: what its text ends with, of energy that was generated (True) or dissipated; called on all ranks alike.
         least_steps: steps of a model before its energy is checked.
         noisy: leave out the warning of motion against the nodes, as where particles do not cross cells.
     """
 
     limit: float | None
     speaks: bool
-    advice: Callable[[], str] = lambda: ADVICE
+    advice: Callable[[bool], str] = lambda generated: ADVICE
     least_steps: int = LEAST_STEPS
     warned: float = WARN_ABOVE
     noisy: bool = False
@@ -71,12 +71,13 @@ class EnergyWatch:
             return
         self.largest = max(self.largest, report.energy_scale)
         fraction = abs(report.unexplained_energy) / self.largest if self.largest > 0 else 0.0
+        generated = report.unexplained_energy < 0
         if self.limit is not None and fraction > self.limit:
             raise RunError(
-                f"{_said(report, self.largest)}, above energy_limit, {100 * self.limit:g} %; {self.advice()}"
+                f"{_said(report, self.largest)}, above energy_limit, {100 * self.limit:g} %; {self.advice(generated)}"
             )
         if fraction > self.warned:
-            self.warned, advice = 10 * fraction, self.advice()
+            self.warned, advice = 10 * fraction, self.advice(generated)
             if self.speaks:
                 warnings.warn(f"{_said(report, self.largest)}; {advice}", EnergyWarning, stacklevel=4)
         if not self.noisy and _is_noisy(report, self.largest):

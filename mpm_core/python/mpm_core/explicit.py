@@ -128,7 +128,7 @@ def run_explicit(
     pauses = 1 if watch is not None or rebalance < np.inf else max(1, 2_000_000 // most // _core.control_interval)
     advice = ADVICE_FOR.get(options.integration, ADVICE)
     energy = EnergyWatch(
-        energy_limit, model.comm.rank == 0, lambda: swollen(model) or advice, noisy=options.moving_cells
+        energy_limit, model.comm.rank == 0, lambda generated: swollen(model) or advice, noisy=options.moving_cells
     )
     failure = FailureWatch(model, options)
     penetration, loads = PenetrationWatch(model), LoadWatch(model)

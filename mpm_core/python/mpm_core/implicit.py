@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,6 +34,13 @@ LEAST_EULER_STEPS = 4
 
 AVERAGED = "implicit steps with nmd=True generate energy where soil dilates, since they do not average its forces: take nmd=False"
 """Advice for implicit runs that average strains of soil that dilates"""
+
+STRAINS_ALONE = (
+    "implicit steps with nmd=True average strains but not forces, which generates energy as soil fails, whatever the step, and more "
+    "from an equilibrium of averaged forces: give bridge.initialise nmd=False, and Model.equilibrate averaged_forces=False "
+    "(docs/howto/limits.md)"
+)
+"""Advice for implicit runs that average strains and generate energy"""
 
 FADING = 0.1
 """Factor on the ghost penalty between steps that only redistribute stresses"""
@@ -79,20 +87,35 @@ def implicit_options(
     return options
 
 
-def _energy_check(options: Any, water: bool) -> tuple[str, int]:
-    """Advice on energy that an implicit run does not explain, and the number of steps from which it is checked.
+def _least_steps(options: Any) -> int:
+    """Number of steps from which the energy of an implicit run is checked."""
+    return LEAST_STEPS if options.second_order or options.damping else LEAST_EULER_STEPS
+
+
+def energy_advice(model: Model, options: Any, generated: bool) -> str:
+    """Advice on energy that an implicit run does not explain. Collective.
 
     Args:
+        model: soil without pore water may take steps of second order.
         options: the core's.
-        water: whether the model has pore water, which steps of second order refuse.
+        generated: the scheme has generated that energy; otherwise it has dissipated it.
     """
-    if options.second_order or options.damping:
-        return ADVICE, LEAST_STEPS
-    less = "shorter steps" if water else "second_order=True with integration=MIXED, or shorter steps,"
+    strains_alone = options.nmd and not options.average_stress
+    if strains_alone and dilates(model.laws):
+        return f"{AVERAGED}; {_usual_advice(model, options, generated)}"
+    return swollen(model) or (
+        STRAINS_ALONE if strains_alone and generated else _usual_advice(model, options, generated)
+    )
+
+
+def _usual_advice(model: Model, options: Any, generated: bool) -> str:
+    """Advice on the scheme itself, of which backward Euler dissipates energy and generates none."""
+    if generated or options.second_order or options.damping:
+        return ADVICE
+    less = "shorter steps" if model.has_water else "second_order=True with integration=MIXED, or shorter steps,"
     return (
         "steps of backward Euler dissipate motion that they resolve, and a slide ends too early: "
-        f"{less} dissipate less (docs/implicit.md)",
-        LEAST_EULER_STEPS,
+        f"{less} dissipate less (docs/implicit.md)"
     )
 
 
@@ -213,10 +236,8 @@ def run_implicit(
     if resumed is not None:
         stepper.control = replace(resumed, longest=dt, length=min(dt, resumed.length))
     model._control = stepper.control
-    advice, least_steps = _energy_check(options, model.has_water)
-    averages = options.nmd and not options.average_stress and dilates(model.laws)
-    advise = (lambda: f"{AVERAGED}; {advice}") if averages else (lambda: swollen(model) or advice)
-    energy = EnergyWatch(energy_limit, model.comm.rank == 0, advise, least_steps)
+    advice = partial(energy_advice, model, options)
+    energy = EnergyWatch(energy_limit, model.comm.rank == 0, advice, _least_steps(options))
     failure = FailureWatch(model, options)
     loads = LoadWatch(model)
 

@@ -80,4 +80,4 @@ def test_energy_that_swollen_particles_may_generate_is_reported_with_their_size(
     assert "a particle has 3 times the volume of its cell" in swollen(model) and "penalty=1" in swollen(model)
     report = replace(model.report(), steps=100, unexplained_energy=-1.0, energy_scale=2.0)
     with pytest.raises(mpm.RunError, match="50 % .* generated .* a particle has 3 times the volume of its cell"):
-        EnergyWatch(0.2, True, lambda: swollen(model)).look(report)
+        EnergyWatch(0.2, True, lambda generated: swollen(model)).look(report)

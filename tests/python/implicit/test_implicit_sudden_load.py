@@ -1,8 +1,13 @@
 """Why damped explicit and implicit runs end apart after a sudden load: the overshoot that long steps do not resolve."""
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pytest
 from core_cases import box
+from mpm_core.energy import EnergyWatch
+from mpm_core.implicit import energy_advice, implicit_options
 
 import mpm_core as mpm
 
@@ -66,3 +71,24 @@ def test_advice_on_energy_names_averaged_strains_where_soil_dilates(dilation_ang
     with pytest.raises(mpm.RunError, match="above energy_limit, 2 %") as error:
         model.implicit(1.0, dt=0.02, nmd=nmd, energy_limit=0.02).last()
     assert ("nmd=True generate energy where soil dilates" in str(error.value)) == told
+
+
+@pytest.mark.parametrize(
+    "nmd, generated, told, not_told",
+    [
+        (True, True, "initialise nmd=False", "shorter steps"),
+        (False, True, "docs/energy.md", "backward Euler"),
+        (True, False, "shorter steps, dissipate less", "initialise"),
+    ],
+)
+def test_advice_on_energy_that_was_generated_is_not_that_on_dissipated_energy(nmd, generated, told, not_told):
+    # Backward Euler dissipates. Energy that is generated comes from averaged strains beside forces that are not averaged.
+    model = mpm.Model(box((4, 4)), mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=25.0))
+    model.seed(density=2000.0, per_cell=6)
+    report = replace(model.report(), steps=100, unexplained_energy=-1.0 if generated else 1.0, energy_scale=10.0)
+    options = implicit_options(0.0, 0.0, nmd, mpm.Integration.MIXED, quasi_static=False, ghost=None)
+    watch = EnergyWatch(None, True, partial(energy_advice, model, options))
+    with pytest.warns(mpm.EnergyWarning) as caught:
+        watch.look(report)
+    text = str(caught[0].message)
+    assert ("was generated" in text) == generated and told in text and not_told not in text
