@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from mpm_core.checks import real_numbers
+from mpm_core.setup_warnings import warn_of_radians
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.errors import InputError
@@ -41,6 +42,7 @@ def k0_jaky(friction_angle: float) -> float:
     """
     if not 0 <= friction_angle < 90:
         raise InputError(f"friction_angle is {friction_angle!r} degrees, expected at least 0 and below 90")
+    warn_of_radians(friction_angle=friction_angle)
     return 1 - np.sin(np.radians(friction_angle))
 
 

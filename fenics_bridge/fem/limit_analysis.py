@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from mpm_core.setup_warnings import warn_of_radians
 from numpy.typing import NDArray
 
 from fenics_bridge.errors import InputError
@@ -65,6 +66,7 @@ def log_spiral(
         InputError: angles or lengths out of range, or a slope so little steeper than the friction angle that it always stands.
     """
     slope = _checked(height, angle, cohesion, friction_angle, depth)
+    warn_of_radians(angle=angle, friction_angle=friction_angle)
     best = _best(slope)
     if not np.isfinite(best.load):
         raise InputError(
@@ -100,6 +102,7 @@ def log_spiral_safety(
     """
     if not 0 < unit_weight < math.inf:
         raise InputError(f"unit_weight is {unit_weight!r} N/m3, expected a positive number")
+    warn_of_radians(angle=angle, friction_angle=friction_angle)
     low, high = 1e-2, 1e2
     for _ in range(24):
         factor = math.sqrt(low * high)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import ufl
 from dolfinx import fem
+from mpm_core.setup_warnings import warn_of_rain
 from numpy.typing import NDArray
 
 from fenics_bridge.errors import agree
@@ -87,6 +88,11 @@ class AppliedBoundary:
             known = isinstance(condition, (Head, Reservoir, SeepageFace, Flux, Rain))
             problem = mistake_in(condition) if known else "expected Head, Reservoir, SeepageFace, Flux or Rain"
             agree(self._space.mesh.comm, f"boundary: {condition!r}: {problem}" if problem else None)
+            if isinstance(condition, Rain) and not callable(condition.rate):
+                rates = np.asarray(condition.rate, dtype=float)
+                warn_of_rain(
+                    self._space.mesh.comm, float(rates.max() if rates.ndim == 0 else rates[:, 1].max()), stacklevel=5
+                )
         self.held = [self._where(condition) for condition in boundary]
         return True
 

@@ -19,7 +19,7 @@ from .mesh import Tag, floats
 from .parameter_fields import Field
 from .particles import Particles
 from .retention import curves_of_laws, joined
-from .setup_warnings import warn_of_water_density
+from .setup_warnings import warn_of_rain, warn_of_water_density
 from .water_checks import density_of_water, require_pores, require_soil
 
 History: TypeAlias = list[tuple[float, float]]
@@ -257,6 +257,7 @@ class PoreWater(Conditions):
                 "the model has no retention curve, which says how rain enters; expected add_water(retention=...)"
             )
         self._set_surface("rain", "rate", rate, least=0.0)
+        warn_of_rain(self.comm, max(value for _, value in self._core.water.rain))
 
     def _set_surface(self, entry: str, name: str, value: Value, least: float = -np.inf) -> None:
         self._require_water()

@@ -35,6 +35,9 @@ STEEPEST_FRICTION = 2.0
 ODD_WATER = (0.1, 200.0, 5000.0)
 """Densities [kg/m3] between the first two and above the last are probably those of water in other units, or under another gravity"""
 
+HEAVIEST_RAIN = 1e-3
+"""Rate [m/s] above which rain is more probably in other units: the heaviest minute on record, 38 mm, had 6.3e-4 m/s"""
+
 RETURNED = 0.01
 """Fraction of a stress by which an update without strain changes it, above which it is probably beyond the yield surface by mistake"""
 
@@ -298,6 +301,25 @@ def in_radians(name: str, angle: float) -> str:
     if not RADIANS[0] <= angle <= RADIANS[1]:
         return ""
     return f"{name} is {angle:g} degrees; angles are in degrees, and {angle:g} rad are {np.degrees(angle):.1f} degrees"
+
+
+def warn_of_radians(**angles: float) -> None:
+    """Warn of angles [degrees], by the names of their arguments, that are probably in radians. Not collective."""
+    for name, angle in angles.items():
+        text = in_radians(name, angle)
+        if text:
+            warnings.warn(text, RuntimeWarning, stacklevel=3)
+
+
+def warn_of_rain(comm: MPI.Comm, rate: float, stacklevel: int = 3) -> None:
+    """Warn of a rate of rain [m/s] that is probably in other units. Not collective."""
+    if comm.rank == 0 and rate > HEAVIEST_RAIN:
+        warnings.warn(
+            f"the rate of the rain is {rate:g} m/s, more than has ever fallen; rates are in m/s, and {rate:g} mm/h are "
+            f"{rate / 3.6e6:.3g} m/s",
+            RuntimeWarning,
+            stacklevel=stacklevel,
+        )
 
 
 def warn_of_friction(comm: MPI.Comm, friction: float) -> None:

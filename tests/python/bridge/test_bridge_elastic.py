@@ -165,3 +165,13 @@ def test_wrong_tractions_are_named(traction):
     domain, facet_tags, supports, _ = column(2)
     with pytest.raises(InputError, match="traction is .*expected"):
         bridge.solve_elastic(domain, facet_tags, supports, YOUNG, POISSON, 0.0, traction={bridge.CREST: traction})
+
+
+def test_angles_in_radians_are_warned_of():
+    with pytest.warns(RuntimeWarning, match="friction_angle is 0.5236 degrees.* are 30.0 degrees"):
+        bridge.k0_jaky(0.5236)
+    slope = {"height": 5.0, "angle": 0.7854, "cohesion": 5e3, "friction_angle": 0.4363}
+    with pytest.warns(RuntimeWarning, match="angle is 0.7854 degrees.* are 45.0 degrees"):
+        bridge.log_spiral(**slope)
+    with pytest.warns(RuntimeWarning, match="friction_angle is 0.4363 degrees.* are 25.0 degrees"):
+        bridge.log_spiral_safety(**slope, unit_weight=18e3)

@@ -74,3 +74,19 @@ def test_functions_of_time_that_return_no_number(wrong, words):
     with pytest.raises(mpm.InputError, match=words):
         model.advance(10.0)
     assert model.time == 0.0
+
+
+@pytest.mark.parametrize("rate", [5.0, ((0.0, 0.0), (3600.0, 5.0))])
+def test_a_rate_of_rain_in_millimetres_per_hour_is_warned_of(rate):
+    """5 mm/h are 1.39e-6 m/s; at 5 m/s it would pond and run off, without a word."""
+    words = "rate of the rain is 5 m/s.* 5 mm/h are 1.39e-06 m/s"
+    domain, tags = box()
+    flow = [water.Head(BASE, 0.0), water.Rain(TOP, rate)]
+    with pytest.warns(RuntimeWarning, match=words):
+        water.Seepage(domain, water.PorousSoil(1e-6, porosity=0.4), tags, flow)
+    model = mpm.Model(bridge.background_mesh(domain, facet_tags=tags), mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed(density=2000.0, per_cell=3)
+    curve = water.VanGenuchten(alpha=1e-4, n=2.0)
+    model.add_water(porosity=0.4, conductivity=1e-6, retention=curve, drained_surface=True)
+    with pytest.warns(RuntimeWarning, match=words):
+        model.rain(rate)
