@@ -39,7 +39,10 @@ from .series import Output, Series, padded
 PARTICLE_FIELDS = (
     "displacement", "velocity", "stress", "deviatoric_strain", "plastic_strain", "volume", "id", "material"
 )  # fmt: skip
-"""Fields that are written of a model's particles beside the position, where nothing else is asked for."""
+"""Fields that are written of a model's particles beside the position, where nothing else is asked for; see `WATER_FIELDS`."""
+
+WATER_FIELDS = ("pore_pressure",)
+"""Fields that are written besides of particles with pore water."""
 
 NODAL_FIELDS = ("mass", "velocity", "internal_force")
 """Fields that are written of its nodes."""
@@ -213,7 +216,7 @@ class ModelOutput:
         bodies: path of the files of the rigid surfaces that the particles touch, as for `BodyOutput`; None if none are to be
             written.
         particle_fields: attributes of ``model.particles``, such as ``velocity``, and ``displacement``, ``plastic_strain``; the
-            position is always written.
+            position is always written. By default `PARTICLE_FIELDS`, and the pore pressure where there is pore water.
         nodal_fields: as ``Model.nodal`` gives them.
         float32: store real numbers in single precision; in double precision if false. Positions are stored in double
             precision where single precision does not resolve them, as with coordinates of a map.
@@ -234,7 +237,7 @@ class ModelOutput:
         model: Model,
         particles: str | os.PathLike[str] | None = None,
         mesh: str | os.PathLike[str] | None = None,
-        particle_fields: Sequence[str] = PARTICLE_FIELDS,
+        particle_fields: Sequence[str] | None = None,
         nodal_fields: Sequence[str] = NODAL_FIELDS,
         float32: bool = True,
         compression: int = 0,
@@ -244,6 +247,8 @@ class ModelOutput:
         if particles is None and mesh is None and bodies is None:
             raise InputError("particles, mesh and bodies are None, expected a path for one of them at least")
         self._model, self._start = model, model.mesh
+        if particle_fields is None:
+            particle_fields = (*PARTICLE_FIELDS, *(WATER_FIELDS if model.has_water else ()))
         self._fields, self._nodal = list(particle_fields), list(nodal_fields)
         self._float32 = float32
         start = model.mesh
@@ -282,11 +287,11 @@ class ModelOutput:
             more: further fields of the particles by name, a row for each.
 
         Raises:
-            InputError: a further field is of another length or not numeric; or there was neither a step nor a ``Model.report``
-                since the particles were set, without which nodes have no values.
+            InputError: a further field is of another length or not numeric, or the model has no particles.
             RunError: the frame cannot be written; with ``background``, or the one before it.
         """
         more = {name: np.array(values) for name, values in (more or {}).items()}  # the caller may change his own
+        self._require_nodal_values()
         failures = []
         for output in self._outputs:
             try:
@@ -303,6 +308,15 @@ class ModelOutput:
                 failures.append(failure)
         if failures:
             raise failures[0]
+
+    def _require_nodal_values(self) -> None:
+        """See that nodes have values where the mesh is written, as they do after a step or a report. Collective."""
+        if not (self._nodal and any(isinstance(output, MeshOutput) for output in self._outputs)):
+            return
+        try:
+            self._model.nodal(self._nodal[0])
+        except InputError:
+            self._model.report()
 
     def _nodal_fields(self) -> dict[str, np.ndarray]:
         """Nodal fields on the mesh as it was at the start. Collective."""

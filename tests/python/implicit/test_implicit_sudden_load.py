@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from core_cases import box
 from mpm_core.energy import EnergyWatch
-from mpm_core.implicit import energy_advice, implicit_options
 
 import mpm_core as mpm
+from mpm_core.implicit import energy_advice, implicit_options
 
 YOUNG, STRENGTH, DENSITY, HEIGHT, DAMPING = 1e6, 1e3, 2000.0, 0.1, 0.75
 YIELD = 2 * STRENGTH  # axial stress at which soil without Poisson's ratio yields under uniaxial strain [Pa]

@@ -10,9 +10,11 @@ import h5py
 import meshio
 import numpy as np
 import pytest
-from mpm_core.output import MeshOutput, ParticleOutput
+from core_cases import box
+from mpm_core.output import MeshOutput, ModelOutput, ParticleOutput
 from output_cases import COMM, SQUARE, TRIANGLES, particle_fields
 
+import mpm_core as mpm
 from mpm_core import InputError, series
 
 
@@ -325,3 +327,20 @@ def test_the_same_frames_make_the_same_files(tmp_path, some):
         with h5py.File(one) as file:
             for name, values in stored(frames[step]).items():
                 np.testing.assert_array_equal(file[name][()], values.astype(file[name].dtype))
+
+
+@pytest.mark.parametrize("wet", [False, True])
+def test_a_model_is_written_before_its_first_step_with_its_pore_pressure(tmp_path, wet):
+    model = mpm.Model(box([2, 2]), mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed(density=2000.0, per_cell=3)
+    if wet:
+        model.add_water(porosity=0.4, conductivity=1e-6)
+        model.set_pore_pressure(lambda x: 5e3 * x[:, 1])
+    with ModelOutput(model, tmp_path / "particles", tmp_path / "mesh") as output:
+        output.write()
+    with h5py.File(tmp_path / "mesh" / "000000.h5") as file:
+        assert file["mass"][()].sum() == pytest.approx(2000.0)
+    with h5py.File(tmp_path / "particles" / "000000.h5") as file:
+        assert ("pore_pressure" in file) == wet
+        if wet:
+            np.testing.assert_allclose(file["pore_pressure"][()], 5e3 * model.particles.position[:, 1], rtol=1e-6)
