@@ -44,9 +44,8 @@ class StagePicture:
                      self.displacement.half_section)  # fmt: skip
 
     def moved(self) -> np.ndarray:
-        """Displacement [m] of each cell that is there: it jumps where soil was placed later than that beside it."""
-        field = self.field()
-        return np.linalg.norm(field.values[field.cells].mean(axis=1), axis=1)
+        """Displacement [m] of each point; where soil was placed later than that beside it, it falls within a row of cells."""
+        return np.linalg.norm(self.displacement.values, axis=1)
 
 
 def stage_picture(site: bridge.FemSite, name: str) -> StagePicture | None:
@@ -70,8 +69,10 @@ def own_cell_values(fem: bridge.QuasiStatic) -> list[np.ndarray]:
 def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) -> None:
     """Draw a panel for each stage, above one another, in one colour scale: displacement, or strain where `quantity` is SHEAR."""
     box = np.array([stages[0].displacement.points.min(axis=0), stages[0].displacement.points.max(axis=0)])
-    values = [quantity.scale * (s.strain[s.there] if quantity is SHEAR else s.moved()) for s in stages]
-    limits = (0.0, max(float(np.quantile(v, 0.995)) for v in values) or 1.0)
+    is_strain = quantity is SHEAR
+    values = [quantity.scale * (s.strain[s.there] if is_strain else s.moved()) for s in stages]
+    drawn = [v if is_strain else v[np.unique(s.field().cells)] for s, v in zip(stages, values)]
+    limits = (0.0, max(float(np.quantile(v, 0.995)) for v in drawn) or 1.0)
     aspect = (box[1, 1] - box[0, 1]) / (box[1, 0] - box[0, 0])
     along, up = axis_labels(stages[0].displacement.half_section)
     with paper_style():
@@ -79,8 +80,9 @@ def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) 
                                       squeeze=False, layout="constrained")  # fmt: skip
         for axes, stage, shown in zip(panels[:, 0], stages, values):
             field = stage.field()
-            axes.tripcolor(*field.points.T, field.cells, facecolors=shown, cmap=quantity.colours, vmin=limits[0], vmax=limits[1],
-                           rasterized=True)  # fmt: skip
+            per_cell, at_points = ({"facecolors": shown}, ()) if is_strain else ({"shading": "gouraud"}, (shown,))
+            axes.tripcolor(*field.points.T, field.cells, *at_points, cmap=quantity.colours, vmin=limits[0], vmax=limits[1],
+                           rasterized=True, **per_cell)  # fmt: skip
             outline = field.points[boundary_edges(field.cells)]
             axes.add_collection(LineCollection(outline, colors="black", linewidths=0.7))
             axes.set_title(f"Stage: {stage.name}", loc="left", pad=3)

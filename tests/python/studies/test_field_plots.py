@@ -7,6 +7,7 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 from studies.common.field_plots import gathered, mechanism_field, soil_borders
+from studies.common.stage_plots import StagePicture
 
 
 def of_degree(degree):
@@ -50,3 +51,13 @@ def test_borders_of_soils_are_the_sides_around_them(tmp_path):
     edges = np.diff(soil_borders(domain, soils), axis=1)[:, 0]
     # Each soil is 1 m by 0.5 m, and the border between the classes of sand is none
     assert np.linalg.norm(edges, axis=1).sum() == pytest.approx(6.0)
+
+
+def test_displacements_of_a_stage_are_those_of_its_points():
+    """As means of cells those of triangles with two corners on a fixed base and of others alternate in a picture."""
+    field = gathered(of_degree(1))
+    there = field.points[field.cells][..., 1].max(axis=1) < 0.6
+    stage = StagePicture("half", field, there, np.zeros(len(field.cells)))
+    assert len(stage.field().cells) == 8
+    x, y = field.points.T
+    assert np.allclose(stage.moved(), np.hypot(y**2, x * y))
