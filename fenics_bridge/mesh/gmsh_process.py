@@ -57,7 +57,8 @@ def read_apart(path: Path, dim: int, result: Path, name: str, limits: Limits) ->
         how = f"signal {-code}" if code < 0 else f"code {code}"
         last = text.rsplit("\n", 1)[-1]
         raise InputError(
-            f"path: gmsh crashed while it read {name!r} ({how}{': ' + last if last else ''}); it is damaged"
+            f"path: gmsh crashed while it read {name!r} ({how}{': ' + last if last else ''}); it is damaged, or one of its "
+            "constants, such as a cell size, is out of range (parameters)"
         )
     with np.load(result) as arrays:
         return dict(arrays)

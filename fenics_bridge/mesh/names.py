@@ -74,6 +74,8 @@ def tag_numbers(
         InputError: one of them does not exist on any rank. Raised on all ranks alike.
     """
     known, names, found = known_tags(comm, tags), names_of(tags), []
+    if tags is None:
+        raise InputError(f"{argument}: {entity}_tags is None, expected the tags in which {given!r} is looked for")
     for one in given if isinstance(given, (list, tuple, set, np.ndarray)) else [given]:
         numbers = names.get(one, ()) if isinstance(one, str) else (one,)
         present = [number for number in numbers if number in known]

@@ -33,7 +33,7 @@ def default_integration(model: Model) -> Integration:
         model: with its particles.
     """
     # Rounded, as round-off and small strains change volumes.
-    mixed = all_cohesive(model.laws) and round(particles_in_cell(model)) >= LEAST_IN_CELL[model.mesh.dim]
+    mixed = all_cohesive(model.laws) and np.rint(particles_in_cell(model)) >= LEAST_IN_CELL[model.mesh.dim]
     return Integration.MIXED if mixed else Integration.PARTICLES
 
 
@@ -56,7 +56,8 @@ def particles_in_cell(model: Model) -> float:
     """Mean number of particles that fill a cell, by their volumes and those of their cells. Collective."""
     p = model.particles
     counts = represented(p)
-    full = counts * model.cell_volumes[p.cell] / p.volume
+    with np.errstate(divide="ignore"):  # a volume of zero is refused by the run
+        full = counts * model.cell_volumes[p.cell] / p.volume
     total, n = model.comm.allreduce(np.array([counts @ full, counts.sum()]))
     return float(total / n) if n else 0.0
 

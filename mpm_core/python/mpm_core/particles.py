@@ -189,6 +189,11 @@ class Particles:
                 water before an explicit step has given it one of its own, or, on all ranks, a traction on a resting cell.
         """
         self._require_all("set")
+        settable = [field["name"] for field in self.schedule() if field["settable"]]
+        if name not in settable:
+            what = "cannot be set" if name in dir(self) else "does not exist"
+            place = "; Model.place moves particles" if name == "position" else ""
+            raise InputError(f"particle field is {name!r}, which {what}, expected one of {', '.join(settable)}{place}")
         if name == "water_velocity" and not self._core.has_two_phases:
             raise InputError(
                 "water_velocity cannot be set yet: water moves with the soil up to the first explicit step with pore water, "

@@ -155,3 +155,11 @@ def test_a_parameter_grows_with_depth(background):
     # u = -gamma / E0 int_0^2 (2 - z) / (1 + z) dz; the mesh of 0.5 m has one modulus in each triangle
     lowest = fem.evaluate_at([(1.0, 1.0)])["displacement"][0, 1]
     assert lowest == pytest.approx(-20e3 / YOUNG * (3 * np.log(3) - 2), rel=0.02)
+
+
+def test_names_of_soils_without_cell_tags_are_an_error_that_asks_for_these():
+    body, _, facets = bridge.soil_mesh(*bridge.slope_mesh(COMM, cell_size=0.5, kind="fitted"))
+    law = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=1e6, friction_angle=30.0)
+    fem = bridge.QuasiStatic(body, law, facets, [bridge.fixed("base")])
+    with pytest.raises(bridge.InputError, match="unit_weight: cell_tags is None, expected the tags in which 'soil' is"):
+        fem.solve(bridge.Load(unit_weight={"soil": 20e3}))

@@ -1,5 +1,7 @@
 """Bad input is refused with an error that names the argument and its value."""
 
+import warnings
+
 import numpy as np
 import pytest
 from core_cases import box, run
@@ -219,8 +221,13 @@ def test_a_model_without_particles_does_not_run():
 @pytest.mark.parametrize(
     ("name", "values", "words"),
     [
-        ("position", np.zeros((24, 2)), "'position', which cannot be set"),
-        ("colour", np.zeros(24), "'colour'"),
+        (
+            "position",
+            np.zeros((24, 2)),
+            "'position', which cannot be set, expected one of velocity.*; Model.place moves",
+        ),
+        ("plastic_strain", np.zeros(24), "'plastic_strain', which cannot be set, expected one of .*state"),
+        ("stres", np.zeros((24, 4)), "'stres', which does not exist, expected one of velocity, stress, "),
         ("stress", np.zeros((24, 3)), r"stress has shape \(24, 3\), expected \(24, 4\)"),
         ("stress", np.zeros((23, 4)), r"stress has shape \(23, 4\)"),
         ("velocity", np.zeros(24), r"velocity has shape \(24,\)"),
@@ -232,6 +239,19 @@ def test_a_model_without_particles_does_not_run():
 def test_bad_particle_fields(model, name, values, words):
     with pytest.raises(mpm.InputError, match=words):
         model.particles.set(name, values)
+
+
+@pytest.mark.parametrize("name", ["mass", "volume"])
+@pytest.mark.parametrize("value", [0.0, -1.0])
+def test_a_mass_or_volume_that_is_not_positive_is_refused_by_the_run(name, value):
+    # In soil with cohesion, whose default integration asks for the number of particles that fill a cell.
+    model = mpm.Model(box([2, 2]), mpm.tresca(young=1e6, poisson=0.3, shear_strength=1e3))
+    model.seed(density=2000.0, per_cell=3)
+    model.particles.set(name, np.full(24, value))
+    for steps in (lambda: run(model, 1e-3), lambda: list(model.implicit(1e-3, dt=1e-3)), model.equilibrate):
+        with warnings.catch_warnings(), pytest.raises(mpm.InputError, match="mass and volume of particle .* positive"):
+            warnings.simplefilter("ignore")
+            steps()
 
 
 def test_bad_questions(model):
