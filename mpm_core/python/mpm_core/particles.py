@@ -163,7 +163,7 @@ class Particles:
             axes: matplotlib axes to draw into, three-dimensional ones in 3D; new ones by default.
 
         Returns:
-            The axes. In two dimensions each particle is a circle as wide as the square of its area.
+            The axes. In two dimensions particles are circles that cover the soil, in three points.
 
         Raises:
             InputError: no such field or component; the message lists them.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from .mesh import Mesh
     from .particles import Particles
     from .report import Report
+
+COVER = 1.15 * np.sqrt(2)
+"""Width of circles over the side of a square that is as large, with which particles cover the soil with hardly any gaps; of squares side
+by side it is the diagonal, and the patterns inside triangles are a little looser"""
 
 _KINDS = {2: "triangles", 3: "tetrahedra"}
 
@@ -44,7 +48,7 @@ def particles_text(particles: Particles) -> str:
 
 
 def model_text(model: Any) -> str:
-    """A model in words: geometry, time, particles of this rank, laws, gravity, boundary conditions."""
+    """A model in words: geometry, time, particles of this rank, laws, gravity, boundary conditions, pore water, rigid surfaces."""
     geometry = model.geometry.name.lower().replace("_", " ")
     rows = [f"law {number}: {law!r}" for number, law in enumerate(model.laws)]
     rows.append(f"gravity {_vector(model.gravity)} m/s2")
@@ -52,11 +56,35 @@ def model_text(model: Any) -> str:
         moves = f"velocity {_vector(values)} m/s" if any(value != 0 for value in values) else "fixed"
         condition = moves if whole else f"roller, normal {_vector(values)}"
         rows.append(f"facet tag {_tag(model.mesh, 'facet', tag)}: {condition}")
+    rows += [*_water_rows(model), *(repr(contact).strip("<>") for contact in model.contacts)]
     return (
         f"<{type(model).__name__}: {geometry}, t = {model.time:g} s; {len(model.particles)} particles on this rank, "
         + "\n  ".join([f"{model.mesh.owned_cells} cells", *rows])
         + ">"
     )
+
+
+def _water_rows(model: Any) -> Iterator[str]:
+    """Pore water in words, and what is prescribed for it; tables have their first and last values."""
+    water = model._core.water
+    if water is None:
+        return
+    yield (
+        f"pore water of {water.density:g} kg/m3, modulus {water.modulus:g} Pa, free surface "
+        f"{'drained' if water.drained_surface else 'impervious'}{', soil that dries' if water.may_dry else ''}"
+    )
+    for name, unit, history in (("water stands up to", "m", water.standing), ("rain", "m/s", water.rain)):
+        if history:
+            yield f"{name} {_span(history)} {unit}"
+    for tag, history, is_level, held, _ in model._water_conditions:
+        what = "water level" if is_level else "pore pressure" if held else "total pressure"
+        yield f"facet tag {_tag(model.mesh, 'facet', tag)}: {what} {_span(history)} {'m' if is_level else 'Pa'}"
+
+
+def _span(history: Sequence[tuple[float, float]]) -> str:
+    """A number, or the first and last ones of a table over time."""
+    first, last = history[0][1], history[-1][1]
+    return f"{first:g}" if len(history) == 1 else f"{first:g} to {last:g}"
 
 
 def _vector(values: Sequence[float | None] | np.ndarray) -> str:
@@ -155,13 +183,15 @@ def plot_particles(particles: Particles, name: str, axes: Any, area: np.ndarray)
     if dim == 3:
         drawn = axes.scatter(*position.T, c=values, s=2)
         axes.set_zlabel("z [m]")
+        axes.set_box_aspect(np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1))  # equal scales
     else:
-        size = np.sqrt(area)
+        size = COVER * np.sqrt(area)
         drawn = EllipseCollection(
             size, size, np.zeros(len(size)), units="xy", offsets=position, offset_transform=axes.transData, array=values
         )
         axes.add_collection(drawn)
         axes.autoscale_view()
-    axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
-    axes.figure.colorbar(drawn, ax=axes, label=label)
+        axes.set_aspect("equal")
+    axes.set(xlabel="x [m]", ylabel="y [m]")
+    axes.figure.colorbar(drawn, ax=axes, label=label, **({"pad": 0.15, "shrink": 0.7} if dim == 3 else {}))
     return axes

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from core_cases import box
 from mpm_core.output import ModelOutput
+from mpm_core.views import COVER
 
 import mpm_core as mpm
 
@@ -100,13 +101,13 @@ def test_components_of_tensors_have_their_names(model, tmp_path):
     assert fields["velocity"].shape == (len(revolved.particles), 3)  # a vector, also for ParaView
 
 
-def test_a_picture_has_a_circle_as_large_as_each_particle_coloured_by_the_field(model):
+def test_a_picture_has_a_circle_for_each_particle_coloured_by_the_field(model):
     p = model.particles
     axes = p.plot("displacement")
     (circles,) = axes.collections
     np.testing.assert_allclose(circles.get_array(), np.linalg.norm(p.displacement, axis=1))
     np.testing.assert_allclose(circles.get_offsets(), p.position)
-    np.testing.assert_allclose((2 * circles._widths) ** 2, p.volume)  # matplotlib keeps half of a width
+    np.testing.assert_allclose((2 * circles._widths) ** 2, COVER**2 * p.volume)  # matplotlib keeps half of a width
     assert axes.figure.axes[1].get_ylabel() == "displacement [m]" and axes.get_aspect() == 1
     again = p.plot("stress_yy", axes)
     np.testing.assert_array_equal(again.collections[1].get_array(), p.stress[:, 1])
@@ -120,7 +121,7 @@ def test_circles_of_a_half_section_have_the_area_of_the_particles_in_it():
     model = mpm.Model(box((4, 2)), mpm.LinearElastic(young=1e6, poisson=0.3), geometry=mpm.Geometry.AXISYMMETRIC)
     model.seed(density=2000.0, per_cell=3)
     (circles,) = model.particles.plot("position_x").collections
-    areas = (2 * circles._widths) ** 2
+    areas = (2 * circles._widths / COVER) ** 2
     assert areas.sum() == pytest.approx(
         np.prod(np.ptp(model.mesh.points, axis=0)), rel=1e-3
     )  # volumes per radian are r A
@@ -132,6 +133,40 @@ def test_a_picture_of_a_solid_is_three_dimensional():
     axes = model.particles.plot("position_z")
     np.testing.assert_allclose(np.asarray(axes.collections[0]._offsets3d[2]), model.particles.position[:, 2])
     assert axes.get_zlabel() == "z [m]"
+    long = mpm.Model(box((8, 2, 2), (4.0, 1.0, 1.0)), model.laws[0])
+    long.seed(density=2000.0, per_cell=1)
+    axes = long.particles.plot("position_z")
+    axes.figure.canvas.draw()
+    shown = np.diff([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])[:, 0]
+    assert shown[0] > 3 * shown[1] and shown[1] == pytest.approx(shown[2])  # and not a cube with empty space
+    sides = axes._box_aspect / shown
+    assert np.allclose(sides, sides[0])  # a metre is as long along each axis
+
+
+@pytest.mark.parametrize("per_cell", [1, 3, 6, 10])
+def test_circles_of_a_picture_leave_hardly_any_gaps(per_cell):
+    """Of the points of a fine raster; of three particles the pattern in a triangle is loosest. As squares they would leave a fifth."""
+    model = mpm.Model(box((4, 4)), mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed(density=2000.0, per_cell=per_cell)
+    (circles,) = model.particles.plot("position_x").collections
+    inside = np.indices((60, 60)).reshape(2, -1).T / 59 * 0.5 + 0.25  # away from the boundary
+    distance = np.linalg.norm(inside[:, None] - model.particles.position, axis=2)
+    assert (distance <= circles._widths).any(axis=1).mean() > 0.98
+
+
+def test_the_text_of_a_model_has_its_water_and_its_rigid_surfaces():
+    model = mpm.Model(box((4, 4)), mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed(density=2000.0, per_cell=3)
+    assert "water" not in repr(model)
+    model.add_water(porosity=0.4, conductivity=1e-6, modulus=1e8, drained_surface=True)
+    model.hold_pore_pressure(1, level=[(0.0, 1.0), (10.0, 0.5)])
+    model.hold_pore_pressure(3, 5e3)
+    model.stand_water(1.2)
+    for words in ("pore water of 1000 kg/m3, modulus 1e+08 Pa, free surface drained", "facet tag 1: water level 1 to 0.5 m",
+                  "facet tag 3: pore pressure 5000 Pa", "water stands up to 1.2 m"):  # fmt: skip
+        assert words in repr(model)
+    model.add_contact(mpm.Plane((0, 1.2), (0, -1)), friction=0.3)
+    assert "RigidContact 0: Plane" in repr(model) and "friction 0.3" in repr(model)
 
 
 def test_a_bar_shows_the_simulated_time(model, capsys):
