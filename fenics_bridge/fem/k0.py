@@ -118,10 +118,17 @@ def surface_height(surface: Surface, points: NDArray[np.float64]) -> NDArray[np.
     """Height of the ground above each point: (n,) [m]; `surface` as in `k0_stress`."""
     if callable(surface):
         height = surface(points[:, 0] if points.shape[1] == 2 else points[:, :-1])
-        return np.broadcast_to(real_numbers("surface", height), (len(points),))
-    line = real_numbers("surface", surface)
+        return np.broadcast_to(_finite_heights(height), (len(points),))
+    line = _finite_heights(surface)
     if line.ndim == 0:
         return np.full(len(points), float(line))
     if line.ndim != 2 or line.shape[1] != 2 or np.any(np.diff(line[:, 0]) < 0):
         raise InputError(f"surface has shape {line.shape}, expected (k, 2) points with x rising")
     return np.interp(points[:, 0], line[:, 0], line[:, 1])
+
+
+def _finite_heights(heights: Any) -> NDArray[np.float64]:
+    line = real_numbers("surface", heights)
+    if not np.isfinite(line).all():
+        raise InputError(f"surface has heights of {line[~np.isfinite(line)][0]} m, expected finite numbers")
+    return line

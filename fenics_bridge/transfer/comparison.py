@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
+from mpm_core.checks import of_kind
 from numpy.typing import ArrayLike, NDArray
 
 import mpm_core as mpm
@@ -47,8 +48,10 @@ def compare(
 
     Raises:
         InputError: the place of a particle is outside the finite elements' mesh (the message names the particle), or the
-            geometries differ. Raised on all ranks alike.
+            geometries differ, or finite elements and model are in the wrong order. Raised on all ranks alike.
     """
+    of_kind("fem", fem, QuasiStatic, ElasticSolution)
+    of_kind("model", model, mpm.Model)
     require_same_geometry(model, fem)
     particles = model.particles
     search = PointSearch(fem.displacement.function_space.mesh, particles.initial_position if places is None else places)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from mpm_core.checks import of_kind
 from numpy.typing import NDArray
 
 import mpm_core as mpm
@@ -95,7 +96,7 @@ def particle_safety(
     models, curve = {}, []
 
     def attempt(factor: float) -> Any:
-        models[factor] = model = model_of(factor)
+        models[factor] = model = of_kind("what model_of returns", model_of(factor), mpm.Model)
         agree(
             model.comm,
             None

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import Hencky, Heterogeneous, InputError, Undrained
-from .checks import real_numbers
+from .checks import count, real_numbers
 from .mesh import Tag, floats
 
 Field = float | ArrayLike | Callable[[NDArray[np.float64]], ArrayLike] | Mapping[Tag, float]
@@ -129,14 +129,17 @@ class RandomField:
         scale = real_numbers("lengths", lengths)
         if scale.ndim != 1 or not (scale > 0).all():
             raise InputError(f"lengths is {lengths!r}, expected a positive number [m] for each axis")
-        if not deviation >= 0:
+        if not real_numbers("deviation", deviation) >= 0:
             raise InputError(f"deviation is {deviation}, expected at least 0")
+        if not np.isfinite(real_numbers("mean", mean)):
+            raise InputError(f"mean is {mean}, expected a finite number")
         if lognormal and not mean > 0:
             raise InputError(f"mean is {mean}, expected a positive one of a lognormal field")
         if correlation not in ("gaussian", "markov"):
             raise InputError(f"correlation is {correlation!r}, expected 'gaussian' or 'markov'")
-        if not waves >= 1:
-            raise InputError(f"waves is {waves}, expected at least 1")
+        count("waves", waves)
+        if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+            raise InputError(f"seed is {seed!r}, expected a whole number from 0 on")
         self.mean, self.deviation, self.lognormal = mean, deviation, lognormal
         random = np.random.default_rng(seed)
         # The spectrum of exp(-r^2 / l^2) is normal with deviation sqrt(2) / l, that of exp(-|r| / l) is Cauchy's of scale 1 / l

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from bridge_cases import POISSON, YOUNG, slope_model, slope_particles
+from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -139,3 +140,11 @@ def test_ground_without_a_depth_is_refused(depth):
 def test_soil_without_weight_has_no_factor_of_safety():
     with pytest.raises(bridge.InputError, match="unit_weight is 0.0 N/m3, expected a positive number"):
         bridge.log_spiral_safety(1.0, 45, 1e3, 25.0, 0.0)
+
+
+def test_finite_elements_and_particles_in_the_wrong_order_are_refused():
+    domain, cell_tags, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (1.0, 1.0), (2, 2))
+    law = mpm.LinearElastic(young=1e6, poisson=0.3)
+    fem = bridge.QuasiStatic(domain, law, facet_tags, [bridge.fixed(3)])
+    with pytest.raises(bridge.InputError, match="(?s)fem is <Model.*expected a QuasiStatic or a ElasticSolution"):
+        bridge.compare(mpm.Model(bridge.background_mesh(domain, cell_tags, facet_tags), law), fem)

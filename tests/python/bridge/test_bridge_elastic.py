@@ -140,6 +140,8 @@ def test_ground_at_rest_is_the_elastic_column():
         (lambda: bridge.k0_stress(np.zeros((1, 2)), 0.0, 1.0, -1), "k0"),
         (lambda: bridge.k0_stress(np.zeros((1, 2)), [(1, 0), (0, 0)], 1.0, 0.5), "surface"),
         (lambda: bridge.k0_stress(np.zeros((1, 2)), 0.0, np.inf, 0.5), "unit_weight"),
+        (lambda: bridge.k0_stress(np.zeros((1, 2)), np.nan, 1.0, 0.5), "surface has heights of nan m"),
+        (lambda: bridge.k0_stress(np.zeros((1, 2)), lambda x: np.nan * x, 1.0, 0.5), "surface has heights of nan m"),
         (lambda: bridge.k0_layered_stress(np.zeros((1, 2)), 0.0, [(-2, 1, 1), (-1, 1, 1)]), "from the top down"),
         (lambda: bridge.k0_layered_stress(np.zeros((1, 2)), 0.0, []), "layers"),
     ],

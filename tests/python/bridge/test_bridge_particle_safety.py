@@ -106,6 +106,8 @@ def test_wrong_arguments_are_named():
         bridge.particle_safety(particles(soil()), start=3.0)
     with pytest.raises(bridge.InputError, match="model_of returns a model without gravity"):
         bridge.particle_safety(particles(soil(), gravity=0.0))
+    with pytest.raises(bridge.InputError, match="what model_of returns is None, expected a Model"):
+        bridge.particle_safety(lambda factor: None)
     for name, value in (("start", 0.0), ("first_step", -1.0), ("tolerance", 1.0), ("damping", 1.0), ("rest", 0.0)):
         with pytest.raises(bridge.InputError, match=f"{name} is {value!r}, expected"):
             bridge.particle_safety(particles(soil()), **{name: value})

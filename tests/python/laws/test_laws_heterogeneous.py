@@ -248,7 +248,9 @@ def test_a_random_field_is_a_function_of_position_only():
     assert np.array_equal(field(x), field(x * [1, 0]))  # constant along the second axis
     for changed, words in [({"lengths": [1.0, 0.0]}, "lengths is"), ({"deviation": -1.0}, "deviation is -1"),
                            ({"correlation": "white"}, "correlation is 'white'"), ({"waves": 0}, "waves is 0"),
-                           ({"mean": 0.0, "lognormal": True}, "mean is 0")]:  # fmt: skip
+                           ({"mean": 0.0, "lognormal": True}, "mean is 0"), ({"mean": np.nan}, "mean is nan, expected a finite"),
+                           ({"mean": "20e3"}, "mean is '20e3'"), ({"deviation": np.nan}, "deviation is nan"),
+                           ({"seed": -1}, "seed is -1, expected a whole number"), ({"waves": 1.5}, "waves is 1.5")]:  # fmt: skip
         with pytest.raises(mpm.InputError, match=words):
             mpm.RandomField(**{"mean": 1.0, "deviation": 0.2, "lengths": [1.0, 1.0], **changed})
 
