@@ -9,6 +9,7 @@ import numpy as np
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from mpm_core.collective import on_first_rank
+from mpm_core.setup_warnings import warn_of_radians
 from numpy.typing import NDArray
 
 from fenics_bridge.errors import InputError, is_finite
@@ -76,6 +77,8 @@ def slope_mesh(
         return makers[kind](*shape)
 
     result = on_first_rank(comm, arrays)
+    if comm.rank == 0:
+        warn_of_radians(angle=angle)
     domain, cell_tags, facet_tags = distributed_mesh(comm, result if result is not None else empty_arrays(2), 2)
     return domain, name_tags(cell_tags, _NAMES[0]), name_tags(facet_tags, _NAMES[1])
 

@@ -245,7 +245,7 @@ class Consolidation(ConsolidationResults):
             pore_pressure: function of positions (n, D) [m] that returns pressures (n,) [Pa], or a Seepage; None for none.
 
         Raises:
-            InputError: values of another shape or not finite. Raised on all ranks alike.
+            InputError: values of another shape or not finite, or finite elements that did not converge. Raised on all ranks alike.
         """
         set_initial_state(self, stress, pore_pressure)
 

@@ -18,6 +18,9 @@ def set_initial_state(model: Any, stress: Any, pore_pressure: Any) -> None:
     comm, points, solution = model.domain.comm, model.points, model._body.solution
     state = None
     if isinstance(stress, QuasiStatic):
+        agree(
+            comm, None if stress.converged else "stress is a QuasiStatic that has not been solved, or did not converge"
+        )
         stress, state = stress.points.stress, stress.points.state
     pressure = _pressures(model, pore_pressure)
     _require(comm, "stress", stress, points.stress.shape)

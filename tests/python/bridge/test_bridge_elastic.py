@@ -177,3 +177,5 @@ def test_angles_in_radians_are_warned_of():
         bridge.log_spiral(**slope)
     with pytest.warns(RuntimeWarning, match="friction_angle is 0.4363 degrees.* are 25.0 degrees"):
         bridge.log_spiral_safety(**slope, unit_weight=18e3)
+    with pytest.warns(RuntimeWarning, match="angle is 0.7854 degrees.* are 45.0 degrees"):
+        bridge.slope_mesh(MPI.COMM_WORLD, height=0.1, angle=0.7854, cell_size=0.05, kind="gmsh")

@@ -202,6 +202,20 @@ def test_bad_arguments_are_named(options, words):
         make(**options)
 
 
+def test_finite_elements_that_carry_no_load_are_no_beginning():
+    domain, facet_tags, supports = block(4)
+    soil = mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=1.0, friction_angle=0.0)
+    boundary = [water.Reservoir(TOP, 1.5)]
+    model = water.Consolidation(domain, soil, water.PorousSoil(1e-7), facet_tags, supports, boundary)
+    fem = bridge.QuasiStatic(domain, soil, facet_tags, [bridge.fixed(LEFT)])
+    with pytest.raises(InputError, match="stress is a QuasiStatic that has not been solved"):
+        model.initialise(fem)
+    with pytest.warns(RuntimeWarning, match="the load was not reached"):
+        fem.solve(bridge.Load(unit_weight=20e3))
+    with pytest.raises(InputError, match="did not converge"):
+        model.initialise(fem)
+
+
 @pytest.mark.parametrize(
     "call, words",
     [
