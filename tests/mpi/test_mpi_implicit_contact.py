@@ -76,3 +76,20 @@ def test_a_rotating_body_moves_alike_on_any_partition(comm, owners_of):
     for name in ("displacement", "angle", "spin", "force"):
         assert getattr(runs[0][1], name) == pytest.approx(getattr(runs[1][1], name), rel=1e-7), name
     assert runs[0][1].angle[0] < -0.01
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
+def test_a_patch_is_loaded_alike_on_any_partition(comm, owners_of):
+    # On sides of tetrahedra whose particles leave gaps, and beyond the end of the soil, x < 0.7.
+    corners = np.array([(0.31, 0.27), (0.31, 0.71), (0.93, 0.66), (0.88, 0.3)])
+    patch = mpm.Triangles(np.column_stack([corners, np.full(4, 0.5)]), [(0, 1, 2), (0, 2, 3)])
+    runs = []
+    for ranks in (comm, MPI.COMM_SELF):
+        mesh = spread_box((5, 5, 8), (1.0, 1.0, 1.0), ranks, owners_of)
+        model = mpm.Model(mesh, mpm.LinearElastic(young=1e6, poisson=0.3))
+        model.seed(density=1000.0, per_cell=4)
+        model.remove((model.particles.position > (0.7, 1.0, 0.5)).any(axis=1))
+        runs.append((model.load_surface(patch, traction=(1.0, 2.0, 3.0)), model))
+    assert runs[0][0] == pytest.approx(runs[1][0], rel=1e-12)
+    force = comm.allreduce(runs[0][1].particles.traction.sum(axis=0))
+    assert force == pytest.approx(runs[0][0] * np.array([1.0, 2.0, 3.0]), rel=1e-12)

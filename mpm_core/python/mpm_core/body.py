@@ -230,14 +230,16 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
     ) -> float:
         """Load the particles beside a surface that does not follow the mesh: ground, a cavity, a footing's lower side.
 
-        Each part of the surface gives its load to the particle nearest to it, on the side where the soil is; parts without any
-        within the particle's side V^(1/D) are not loaded, which a warning says where soil is a little farther away. The forces
-        move with the particles, keep their direction, and add to those that are there. The sum of forces is that of the surface
-        to round-off; they act half a particle inside of it.
+        Each part of the surface gives its load to the particle nearest to it, on the side where the soil is. Parts within the
+        particle's side V^(1/D) are loaded, and so are those within twice of it (more in flat cells) between such parts or at the
+        end of the surface: particles that fill triangles or tetrahedra are not in rows along it. Other parts are not, which a
+        warning says where soil is a little farther away. The forces move with the particles, keep their direction, and add to
+        those that are there. The sum of forces is that of the loaded parts to round-off; they act half a particle inside of it.
 
         Args:
             surface: as for `add_contact`; it bounds the soil where it is to be loaded, and its shape is taken once. Let one
-                that is larger than the soil end with it: a part of up to half a particle beyond the soil counts.
+                that is larger than the soil end with it: parts count until some half a particle's side beyond the soil, at most
+                a side, and so do the faces of a box that rise from the soil on which it stands.
             pressure: [Pa], towards the soil.
             traction: force per area [Pa], shape (D,); instead of a pressure.
 

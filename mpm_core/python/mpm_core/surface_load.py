@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from itertools import product
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,13 +24,23 @@ if TYPE_CHECKING:
 
 FINENESS = 4
 """Points to a particle's side at which the surface is loaded"""
+REACH = 2.0
+"""Distance from a particle, over its side, within which a gap of the surface between loaded parts lies beside soil
 
-NEARLY = 1.25
-"""Distance from a particle, over its side, within which a part of the surface without load is probably one beside soil"""
-MOST_MISSED = 0.1
-"""Fraction of the loaded area from which such parts are worth a warning; at ends of the soil there are always some"""
+Points within a side of a particle lie beside soil. Particles that are spread evenly in cells, not in squares, leave gaps between
+them, up to 1.4 sides from any particle where cells are halves of squares or sixths of cubes; farther in flatter cells (`stretch`).
+"""
+ALIKE = np.cos(np.pi / 4)
+"""Cosine of the angle between normals up to which two parts of a surface belong to one face"""
+DEPTH = 4.0
+"""Length, over a particle's side, of the cylinder beneath a part of the surface in which soil is looked for; its radius is a side"""
+ONE_SIDED = 0.4
+"""Mean distance from its axis, over a side, from which particles in it are taken for soil that ends there"""
+MOST_MISSED = 0.01
+"""Fraction of the area from which parts with soil beneath them, but out of reach, are worth a warning"""
 
-Samples = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+Floats = NDArray[np.float64]
+Samples = tuple[Floats, Floats, Floats]
 """Points, the parts of the surface that they stand for, and its normals towards the soil"""
 
 
@@ -36,7 +48,7 @@ def load_surface(model: Body, surface: Surface, pressure: float | None, traction
     """See `Model.load_surface`."""
     dim, particles = model.mesh.dim, model.particles
 
-    def wanted() -> tuple[float, NDArray[np.float64]]:
+    def wanted() -> tuple[float, Floats]:
         checked(surface, dim)
         if (pressure is None) == (traction is None):
             raise InputError(
@@ -53,27 +65,20 @@ def load_surface(model: Body, surface: Surface, pressure: float | None, traction
         raise InputError("the model has no particles, seed some before a surface is loaded")
     low, high = mesh_box(model)
     points, parts, normals = samples(surface, low, high, finest / FINENESS)
-    near = distances(surface, particles.position) < 2 * size
-    numbers = np.flatnonzero(near)
-    found, squares = nearest(points, normals, particles.position[near], size[near])
-    least = np.empty_like(squares)
-    model.comm.Allreduce(squares, least, MPI.MIN)
-    rank = np.where(squares == least, model.comm.rank, model.comm.size).astype(np.int32)
-    first = np.empty_like(rank)
-    model.comm.Allreduce(rank, first, MPI.MIN)
-    loaded = np.isfinite(least)
+    near = np.flatnonzero(distances(surface, particles.position) < DEPTH * size)
+    reach = REACH * size[near] * stretch(model.mesh.points[model.mesh.cells[particles.cell[near]]])
+    soil = Soil(model.comm, particles.position[near], size[near], reach)
+    loaded, own, found = beside(points, normals, soil)
     if not loaded.any():
         raise InputError(f"surface {surface!r} has no soil beside it, expected some to carry the load")
     if model.geometry == Geometry.AXISYMMETRIC:
         parts = parts * points[:, 0]
-    own = loaded & (first == model.comm.rank)
     forces = particles.traction.copy() if len(particles.traction) else np.zeros((len(size), dim))
-    np.add.at(forces, numbers[found[own]], parts[own, None] * (normal_stress * normals[own] + vector))
+    np.add.at(forces, near[found[own]], parts[own, None] * (normal_stress * normals[own] + vector))
     particles._set_tractions(forces, f"surface {surface!r}")
     area = float(parts[loaded].sum())
-    _, squares = nearest(points[~loaded], normals[~loaded], particles.position[near], NEARLY * size[near])
-    is_near = np.array(model.comm.allgather(np.isfinite(squares))).any(axis=0)
-    _warn_of_gaps(model.comm, surface, float(parts[~loaded][is_near].sum()), area)
+    missed = soil.beneath(points[~loaded], normals[~loaded])
+    _warn_of_gaps(model.comm, surface, float(parts[~loaded][missed].sum()), area)
     return area
 
 
@@ -88,7 +93,88 @@ def _warn_of_gaps(comm: MPI.Comm, surface: Surface, missed: float, area: float) 
         )
 
 
-def samples(surface: Surface, lower: NDArray[np.float64], upper: NDArray[np.float64], spacing: float) -> Samples:
+def beside(
+    points: Floats, normals: Floats, soil: Soil
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.int64]]:
+    """Which points of a surface lie beside soil, those of them with a particle of this rank, and its number. Collective."""
+    squares, own, found, _ = soil.nearest(points, normals, soil.size)
+    far = np.flatnonzero(np.isinf(squares))
+    squares[far], own[far], found[far], excess = soil.nearest(points[far], normals[far], soil.reach)
+    is_bare = np.isinf(squares)
+    loaded, in_reach = ~is_bare, ~is_bare[far]
+    gaps = far[in_reach]
+    # Within its reach soil seems to end that much farther away, where the surface goes on beyond it.
+    loaded[gaps] = ~_is_near(points[gaps], normals[gaps], excess[in_reach], points[is_bare], normals[is_bare])
+    return loaded, own & loaded, found
+
+
+def stretch(corners: Floats) -> Floats:
+    """Longest edge over V^(1/D) of simplices (n, D + 1, D), over that of a half of a square or a sixth of a cube; at least 1."""
+    dim = corners.shape[2]
+    pairs_of_corners = combinations(range(dim + 1), 2)
+    longest = np.max([np.linalg.norm(corners[:, a] - corners[:, b], axis=1) for a, b in pairs_of_corners], axis=0)
+    side = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) ** (1 / dim)  # of a square or cube with D! of them
+    return np.maximum(longest / (side * np.sqrt(dim)), 1.0)
+
+
+def _is_near(points: Floats, normals: Floats, reach: Floats, others: Floats, directions: Floats) -> NDArray[np.bool_]:
+    """Whether points have another one of the same face within their reach."""
+    near = np.zeros(len(points), dtype=bool)
+    for rows, k, arm in pairs(points, others, reach.max(initial=0.0)):
+        alike = np.einsum("ij,ij->i", normals[rows], directions[k]) > ALIKE
+        near[rows] |= alike & (np.einsum("ij,ij->i", arm, arm) < reach[rows] ** 2)
+    return near
+
+
+@dataclass(frozen=True)
+class Soil:
+    """The particles of this rank near a surface: positions, sides and reaches [m]; functions are collective."""
+
+    comm: MPI.Comm
+    places: Floats
+    size: Floats
+    reach: Floats
+
+    def nearest(
+        self, points: Floats, normals: Floats, limit: Floats
+    ) -> tuple[Floats, NDArray[np.bool_], NDArray[np.int64], Floats]:
+        """The particle nearest to each point, on the soil's side of the surface, within the particle's limit.
+
+        Returns:
+            Squares of the distances over all ranks, infinite where there is no particle; whether it is on this rank, and its
+            number there; how much its limit is more than its side.
+        """
+        number, squares = np.zeros(len(points), dtype=np.int64), np.full(len(points), np.inf)
+        for rows, p, arm in pairs(points, self.places, limit.max(initial=0.0)):
+            distance = np.einsum("ij,ij->i", arm, arm)
+            reaches = (distance < limit[p] ** 2) & (np.einsum("ij,ij->i", arm, normals[rows]) > 0)
+            better = reaches & (distance < squares[rows])
+            number[rows[better]], squares[rows[better]] = p[better], distance[better]
+        least = np.empty_like(squares)
+        self.comm.Allreduce(squares, least, MPI.MIN)
+        candidate = np.isfinite(least) & (squares == least)
+        first = np.where(candidate, self.comm.rank, self.comm.size).astype(np.int32)
+        self.comm.Allreduce(MPI.IN_PLACE, first, MPI.MIN)
+        own = candidate & (first == self.comm.rank)
+        excess = np.zeros(len(points))
+        excess[own] = limit[number[own]] - self.size[number[own]]
+        self.comm.Allreduce(MPI.IN_PLACE, excess, MPI.SUM)
+        return least, own, number, excess
+
+    def beneath(self, points: Floats, normals: Floats) -> NDArray[np.bool_]:
+        """Whether there is soil beneath points of a surface, all around their normals, though it may be out of reach."""
+        sums = np.zeros((len(points), 1 + points.shape[1]))  # number of particles, and distances from the normals
+        for rows, p, arm in pairs(points, self.places, DEPTH * self.size.max(initial=0.0)):
+            arm /= self.size[p, None]
+            along = np.einsum("ij,ij->i", arm, normals[rows])
+            off = arm - along[:, None] * normals[rows]
+            inside = (along > 0) & (along < DEPTH) & (np.einsum("ij,ij->i", off, off) < 1)
+            sums[rows[inside]] += np.column_stack([np.ones(inside.sum()), off[inside]])
+        self.comm.Allreduce(MPI.IN_PLACE, sums, MPI.SUM)
+        return np.linalg.norm(sums[:, 1:], axis=1) < ONE_SIDED * sums[:, 0]
+
+
+def samples(surface: Surface, lower: Floats, upper: Floats, spacing: float) -> Samples:
     """Points evenly on a surface, not farther apart than a spacing."""
     points, cells = outline(surface, lower, upper)
     corners = points[cells].astype(float)
@@ -111,7 +197,7 @@ def samples(surface: Surface, lower: NDArray[np.float64], upper: NDArray[np.floa
     return at, np.concatenate(parts), n
 
 
-def _middles(n: int, dim: int) -> NDArray[np.float64]:
+def _middles(n: int, dim: int) -> Floats:
     """Barycentric coordinates of the middles of n equal parts of a segment, or n^2 of a triangle."""
     if dim == 2:
         t = (np.arange(n) + 0.5) / n
@@ -123,7 +209,7 @@ def _middles(n: int, dim: int) -> NDArray[np.float64]:
     return np.column_stack([1 - u - v, u, v])
 
 
-def _measured(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _measured(corners: Floats) -> tuple[Floats, Floats]:
     """Length or area of segments or triangles, and a direction at right angles to them."""
     edge = corners[:, 1] - corners[:, 0]
     if corners.shape[2] == 2:
@@ -134,24 +220,21 @@ def _measured(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArra
     return 0.5 * length, twice / length[:, None]
 
 
-def nearest(
-    points: NDArray[np.float64], normals: NDArray[np.float64], places: NDArray[np.float64], size: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """The particle nearest to each point of a surface, on the soil's side of it, within the particle's side.
+def pairs(points: Floats, places: Floats, reach: float) -> Iterator[tuple[NDArray, NDArray, Floats]]:
+    """Pairs of points and places that are not farther apart than a distance, with others that are.
 
-    Returns:
-        Numbers of the particles, and the squares of the distances; infinite where there is none.
+    Yields:
+        Numbers of points, each once, numbers of places, and the arms from the former to the latter.
     """
-    number, squares = np.zeros(len(points), dtype=np.int64), np.full(len(points), np.inf)
-    if len(places) == 0:
-        return number, squares
-    low, side = places.min(axis=0), float(size.max())
-    cell = np.floor((places - low) / side).astype(np.int64)
+    if len(points) == 0 or len(places) == 0:
+        return
+    low = places.min(axis=0)
+    cell = np.floor((places - low) / reach).astype(np.int64)
     shape = cell.max(axis=0) + 3  # a border of empty cells, so that neighbours have numbers of their own
     keys = np.ravel_multi_index((cell + 1).T, shape)
     order = np.argsort(keys, kind="stable")
     ranked = keys[order]
-    at = np.floor((points - low) / side).astype(np.int64)
+    at = np.floor((points - low) / reach).astype(np.int64)
     inside = np.flatnonzero(((at >= -1) & (at < shape - 1)).all(axis=1))
     for step in product((-1, 0, 1), repeat=points.shape[1]):
         moved = at[inside] + step + 1
@@ -161,10 +244,5 @@ def nearest(
         while (left := begin < end).any():
             rows, begin, end = rows[left], begin[left], end[left]
             p = order[begin]
-            arm = places[p] - points[rows]
-            distance = np.einsum("ij,ij->i", arm, arm)
-            reaches = (distance < size[p] ** 2) & (np.einsum("ij,ij->i", arm, normals[rows]) > 0)
-            better = reaches & (distance < squares[rows])
-            number[rows[better]], squares[rows[better]] = p[better], distance[better]
+            yield rows, p, places[p] - points[rows]
             begin = begin + 1
-    return number, squares
