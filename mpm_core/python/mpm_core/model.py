@@ -15,6 +15,7 @@ from .collective import collectively
 from .contact import refuse_contacts, refuse_driven_bodies, require_new_soil_outside
 from .contact_methods import ContactMethods
 from .energy import energy_limit as checked_energy_limit
+from .equilibrium import find_equilibrium
 from .explicit import (
     explicit_options,
     report_times,
@@ -26,7 +27,7 @@ from .explicit import (
 )
 from .far_field import refuse_far_field
 from .ghost import GhostPenalty
-from .implicit import checked_accuracy, find_equilibrium, implicit_options, run_implicit
+from .implicit import checked_accuracy, implicit_options, run_implicit
 from .integration import integration_of
 from .mesh import floats
 from .newton import Newton
