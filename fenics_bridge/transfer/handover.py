@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from mpm_core.checks import flag, of_kind, renamed
+from mpm_core.checks import flag, member, of_kind, renamed
 from mpm_core.collective import collectively
+from mpm_core.equilibrium import beyond_equilibrium
 from numpy.typing import NDArray
 
 import mpm_core as mpm
@@ -119,8 +120,11 @@ def initialise(
         "equilibrate": equilibrate,
         "resting": resting,
     }
-    collectively(model.comm, lambda: [flag(name, value) for name, value in options.items()])
-    _require_usable(model, fem, move, equilibrate and not resting)
+    chosen = () if nmd is None else (("nmd", nmd),)
+    collectively(model.comm, lambda: [flag(name, value) for name, value in (*options.items(), *chosen)])
+    if integration is not None:
+        collectively(model.comm, lambda: member("integration", integration, mpm.Integration))
+    _require_usable(model, fem, move, equilibrate and not resting, integration)
     _warn_of_other_weight(model, fem)
     _warn_of_other_water(model, fem)
     _warn_of_missing_loads(model, fem)
@@ -205,7 +209,9 @@ def _returned(
     return outside
 
 
-def _require_usable(model: mpm.Model, fem: Any, move: bool, equilibrate: bool) -> None:
+def _require_usable(
+    model: mpm.Model, fem: Any, move: bool, equilibrate: bool, integration: mpm.Integration | None
+) -> None:
     solved = not isinstance(fem, QuasiStatic) or fem.converged
     agree(model.comm, None if solved else "fem has not been solved, or its last solution did not converge")
     require_same_geometry(model, fem)
@@ -221,22 +227,17 @@ def _require_usable(model: mpm.Model, fem: Any, move: bool, equilibrate: bool) -
         "and another one where they have none"
     )
     agree(model.comm, None if fits else problem)
-    agree(model.comm, _not_equilibrated(model) if equilibrate else None)
+    agree(model.comm, _not_equilibrated(model, integration) if equilibrate else None)
     agree(model.comm, _rising_gravity(model))
     known = not move or hasattr(model.mesh, "domain")
     agree(model.comm, None if known else "model: to move particles its mesh must come from `background_mesh`")
 
 
-def _not_equilibrated(model: mpm.Model) -> str | None:
-    """What `Model.equilibrate` does not support, in words; None for nothing."""
-    beyond = {
-        "contact with rigid surfaces": model._contacts,
-        "sides that absorb waves": model._absorbing,
-        "several velocity fields": max(model._velocity_fields) > 0,
-    }
-    found = " and ".join(name for name, there in beyond.items() if there)
-    words = f"equilibrate is True, expected False where the model has {found}, which Model.equilibrate does not support"
-    return words if found else None
+def _not_equilibrated(model: mpm.Model, integration: mpm.Integration | None) -> str | None:
+    """Why `Model.equilibrate` would refuse a model, in words; None if it would not."""
+    beyond = beyond_equilibrium(model, integration)
+    words = f"equilibrate is True, expected False with {beyond}, which Model.equilibrate does not support"
+    return words if beyond else None
 
 
 def _rising_gravity(model: mpm.Model) -> str | None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from ._core import RunError
+from ._core import InputError, Integration, RunError
 from .implicit import Stepper
 from .report import ImplicitReport
 
@@ -15,6 +15,26 @@ if TYPE_CHECKING:
 
 FADING = 0.1
 """Factor on the ghost penalty between steps that only redistribute stresses"""
+
+
+def beyond_equilibrium(model: Model, integration: Integration | None = None) -> str:
+    """What `Model.equilibrate` does not support of a model and of an integration, in words; empty for nothing."""
+    surfaces = ", ".join(entry["surface"]["kind"] for entry in model._contacts)
+    fields = 1 + max(model._velocity_fields)
+    beyond = {
+        f"contact with rigid surfaces ({surfaces})": model._contacts,
+        "sides that absorb waves": model._absorbing,
+        f"{fields} velocity fields": fields > 1,
+        "pore water with a velocity of its own since explicit()": model._core.has_two_phases,
+        "integration DUAL_DOMAIN": integration == Integration.DUAL_DOMAIN,
+    }
+    return " and ".join(name for name, there in beyond.items() if there)
+
+
+def refuse_beyond_equilibrium(model: Model, integration: Integration | None) -> None:
+    """Raises InputError for what `beyond_equilibrium` finds."""
+    if beyond := beyond_equilibrium(model, integration):
+        raise InputError(f"equilibrate() does not support {beyond}")
 
 
 def find_equilibrium(model: Model, solver: Any, options: Any, tolerance: float, max_steps: int) -> ImplicitReport:

@@ -15,7 +15,7 @@ from .collective import collectively
 from .contact import refuse_contacts, refuse_driven_bodies, require_new_soil_outside
 from .contact_methods import ContactMethods
 from .energy import energy_limit as checked_energy_limit
-from .equilibrium import find_equilibrium
+from .equilibrium import find_equilibrium, refuse_beyond_equilibrium
 from .explicit import (
     explicit_options,
     report_times,
@@ -394,12 +394,11 @@ class Model(ContactMethods, Body):
                 without averages balance the loads.
 
         Raises:
-            InputError: an argument out of its range.
+            InputError: an argument out of its range; a model with contact, absorbing sides, several velocity fields or water that
+                has a velocity of its own.
             RunError: no equilibrium within ``max_steps``, or a step that did not converge.
         """
-        refuse_contacts(self, "equilibrate()")
-        refuse_absorbing(self, "equilibrate()")
-        refuse_two_phases(self, "equilibrate()")
+        refuse_beyond_equilibrium(self, integration)
         integration = integration_of(self, integration)
         options, method, ratio, most_steps = collectively(
             self.comm,

@@ -329,9 +329,21 @@ def test_particle_outside_is_named():
 
 
 @pytest.mark.parametrize(
-    ("fields", "found"), [(None, "contact with rigid surfaces"), ([0, 1], "several velocity fields")]
+    ("make", "fields", "options", "found"),
+    [
+        (lambda model: model.add_contact(mpm.Plane((0.0, -0.1), (0.0, 1.0))), None, {}, "contact with .* \\(Plane\\)"),
+        (lambda model: model.absorb(2), None, {}, "sides that absorb waves"),
+        (lambda model: None, [0, 1], {}, "2 velocity fields"),
+        (lambda model: None, None, {"integration": mpm.Integration.DUAL_DOMAIN}, "integration DUAL_DOMAIN"),
+        (
+            lambda model: model.absorb(2),
+            [0, 0],
+            {"integration": mpm.Integration.DUAL_DOMAIN},
+            "sides .* and integration",
+        ),
+    ],
 )
-def test_what_equilibrate_does_not_support_is_refused_before_particles_change(fields, found):
+def test_what_equilibrate_does_not_support_is_refused_before_particles_change(make, fields, options, found):
     cells = bridge.box_mesh(MPI.COMM_WORLD, [1.0, 1.0], [4, 4])
     soil = mpm.LinearElastic(young=1e6, poisson=0.3)
     elements = bridge.QuasiStatic(cells[0], soil, cells[2], [bridge.fixed(3)], degree=1)
@@ -340,13 +352,24 @@ def test_what_equilibrate_does_not_support_is_refused_before_particles_change(fi
     model.seed(density=UNIT_WEIGHT / 9.81, per_cell=3)
     model.fix(3)
     model.set_gravity((0, -9.81))
-    if fields is None:
-        model.add_contact(mpm.Plane((0.0, -0.1), (0.0, 1.0)))
-    with pytest.raises(mpm.InputError, match=f"equilibrate is True, expected False where the model has {found}"):
-        bridge.initialise(model, elements)
+    make(model)
+    with pytest.raises(mpm.InputError, match=f"equilibrate is True, expected False with {found}"):
+        bridge.initialise(model, elements, **options)
+    with pytest.raises(mpm.InputError, match=f"equilibrate\\(\\) does not support {found}"):
+        model.equilibrate(**options)
     assert not model.particles.stress.any()
-    bridge.initialise(model, elements, equilibrate=False)
+    bridge.initialise(model, elements, equilibrate=False, **options)
     assert model.particles.stress.any()
+
+
+@pytest.mark.parametrize(
+    "options, words", [({"nmd": "no"}, "nmd is 'no'"), ({"integration": "mixed"}, "integration is 'mixed'")]
+)
+def test_options_of_the_run_that_are_none_are_refused_before_particles_change(options, words):
+    model = slope_particles(UNIT_WEIGHT)
+    with pytest.raises(mpm.InputError, match=words):
+        bridge.initialise(model, solved(degree=1), **options)
+    assert not model.particles.stress.any()
 
 
 def test_gravity_that_still_rises_is_refused_and_said():

@@ -163,6 +163,20 @@ def test_equilibration_leaves_the_pressures():
     np.testing.assert_allclose(model.particles.pore_pressure, there, rtol=1e-12)
 
 
+def test_water_with_a_velocity_of_its_own_is_refused_before_particles_change():
+    fem, model = consolidating()
+    wet(model)
+    model.explicit(1e-5, nmd=True).last()
+    before = model.particles.stress.copy(), model.particles.pore_pressure.copy()
+    with pytest.raises(
+        mpm.InputError, match="equilibrate is True, expected False with pore water with a velocity of its own"
+    ):
+        bridge.initialise(model, fem)
+    np.testing.assert_array_equal(model.particles.stress, before[0])
+    np.testing.assert_array_equal(model.particles.pore_pressure, before[1])
+    bridge.initialise(model, fem, equilibrate=False)
+
+
 def test_dry_particles_are_refused():
     fem, model = consolidating()
     with pytest.raises(mpm.InputError, match="expected a water.Consolidation where particles have pore water"):
