@@ -85,15 +85,13 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
     clock.begin(Phase::momentum);
     add_work(field, exchange.owned, gravity, options.damping, dt, model.totals);
     if (affine)
-      begin_transfer_loss(field, exchange.owned, dt, model.energy);
+      add_transfer_work(field, exchange.owned, dt, model.energy);
     note_rayleigh_work(exchange.owned, dt, field, model.totals);
     clock.begin(Phase::averaging);
     find_means(mesh, exchange, options, dt, field);
   }
   note_field_contact_work(model, dt);
   update_particles(model, options, dt, true, clock); // (18), (20), stresses; migration
-  if (affine)
-    model.energy.pic_loss -= model.energy.kinetic;
 }
 
 /// Stresses last, with v_i + dt a_i (USL).

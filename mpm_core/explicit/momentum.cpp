@@ -133,8 +133,7 @@ double add_work(const VelocityField<G>& field, std::span<const unsigned char> ow
 }
 
 template <class G>
-void begin_transfer_loss(const VelocityField<G>& field, std::span<const unsigned char> owned, double dt,
-                         EnergyBook& book)
+void add_transfer_work(const VelocityField<G>& field, std::span<const unsigned char> owned, double dt, EnergyBook& book)
 {
   double work = 0;
   for (Index i : field.part.nodes)
@@ -142,8 +141,7 @@ void begin_transfer_loss(const VelocityField<G>& field, std::span<const unsigned
       for (int a = 0; a < G::dim; ++a)
         work += 0.5 * dt * field.nodes[i].mass * field.acceleration[i][a] *
                 (field.start_velocity[i][a] + field.velocity[i][a]);
-  book.pic_loss += work + book.kinetic;
-  book.kinetic = 0; // the particles' pass sums it again
+  book.pic_loss += work;
 }
 
 #define INSTANTIATE(G)                                                                                                 \
@@ -152,7 +150,7 @@ void begin_transfer_loss(const VelocityField<G>& field, std::span<const unsigned
   template void find_mapped_velocity(double, VelocityField<G>&);                                                       \
   template double add_work(const VelocityField<G>&, std::span<const unsigned char>, const Vector<G::dim>&, double,     \
                            double, Totals&);                                                                           \
-  template void begin_transfer_loss(const VelocityField<G>&, std::span<const unsigned char>, double, EnergyBook&);
+  template void add_transfer_work(const VelocityField<G>&, std::span<const unsigned char>, double, EnergyBook&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

@@ -29,9 +29,9 @@ template <class G>
 double add_work(const VelocityField<G>& field, std::span<const unsigned char> owned, const Vector<G::dim>& gravity,
                 double damping, double dt, Totals& totals);
 
-/// Begins to book what an affine transfer takes out: the work that moves the nodes, and the particles' kinetic energy
-/// at the start, of which that at the end is left.
+/// Books the work that moves the nodes, of which an affine transfer loses what the kinetic energy does not gain by the
+/// end of the run.
 template <class G>
-void begin_transfer_loss(const VelocityField<G>& field, std::span<const unsigned char> owned, double dt,
-                         EnergyBook& book);
+void add_transfer_work(const VelocityField<G>& field, std::span<const unsigned char> owned, double dt,
+                       EnergyBook& book);
 } // namespace mpm::explicit_scheme

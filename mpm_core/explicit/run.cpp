@@ -126,6 +126,17 @@ void require_moving_cells(const Model<G>& model, const ExplicitOptions& options)
     throw InputError(option + " with outflow facets, expected a mesh without, since no particle reaches them");
 }
 
+/// Books what an affine transfer has lost in a run: the work that moved the nodes less the gain of kinetic energy.
+/// @note Collective
+template <class G>
+void end_transfer(Model<G>& model)
+{
+  EnergyBook& book = model.energy;
+  book.pic_loss += book.kinetic; // at the start, without that of particles that flowed out
+  book.kinetic = affine_kinetic_energy(model);
+  book.pic_loss -= book.kinetic;
+}
+
 template <class G>
 double next_step(const Model<G>& model, const RunOptions& run, double critical)
 {
@@ -159,7 +170,6 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
   prepare(model);
   if (options.moving_cells)
     begin_moving_cells(model);
-  model.energy.kinetic = kinetic_energy(model.particles, 0, model.particles.size());
   ExplicitOptions of_step = options;
   std::int64_t done = 0;
   double dt = 0;
@@ -186,6 +196,8 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
       throw RunError(text);
   }
   update_resting_rows(model);
+  if (options.transfer == Transfer::affine)
+    end_transfer(model);
   if (model.failure)
     throw RunError(failure_text(model, *model.failure) + advice_on(options));
   make_resting_cells(model.mesh, model.particles, model.fields.front()); // as a run that goes on from a file begins

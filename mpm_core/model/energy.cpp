@@ -1,6 +1,7 @@
 #include "model/energy.h"
 
 #include "materials/laws/stored_energy.h"
+#include "model/affine.h"
 #include "model/model.h"
 #include "transfer/resting.h"
 
@@ -93,6 +94,8 @@ ParticleEnergy particle_energy(const Model<G, D>& model)
     sum.kinetic += energy.kinetic;
     sum.stored += energy.stored;
   }
+  if (has_affine_gradients(model.particles))
+    sum.kinetic = model.energy.kinetic;
   return sum;
 }
 

@@ -21,7 +21,7 @@ struct EnergyBook
   double stress_work = 0;     ///< of the particles' stresses on their strains since the model was made
   double ahead = 0;           ///< part of it that belongs to the half step by which stresses are ahead of velocities
   double pic_loss = 0;        ///< kinetic energy that PIC, or affine transfer, has taken out
-  double kinetic = 0;         ///< of the particles after the last step, where transfer is affine
+  double kinetic = 0;         ///< where particles have gradients, see `affine_kinetic_energy`; in a run at its start
   double outflow_kinetic = 0; ///< of particles that flowed out
   double outflow_stored = 0;
   double balance_start = 0;  ///< see `energy_balance`, when the particles were last changed by anything but a step
@@ -37,7 +37,7 @@ struct EnergyBook
 template <class G, int D>
 struct Model;
 
-/// Energies over this rank's particles [J].
+/// Energies over this rank's particles [J]; where they have gradients, the kinetic one is that of its nodes.
 struct ParticleEnergy
 {
   double kinetic;

@@ -1,6 +1,7 @@
 #include "model/model.h"
 
 #include "base/number_text.h"
+#include "model/affine.h"
 #include "model/mapping.h"
 #include "model/resting_nodes.h"
 #include "parallel/agreement.h"
@@ -238,8 +239,6 @@ void prepare(Model<G>& model)
   find_least_masses(model);
   model.inventory = taken_inventory(model);
   model.ready = true;
-  if (model.energy.stale)
-    start_energy_balance(model);
 
   stand_water(model, model.time, gravity_at(model, model.time));
   map_to_nodes(model); // what nodes are at the start may be looked at before a step
@@ -248,6 +247,10 @@ void prepare(Model<G>& model)
     find_start_velocity(field);
     field.velocity = field.start_velocity;
   }
+  if (has_affine_gradients(model.particles))
+    model.energy.kinetic = affine_kinetic_energy(model);
+  if (model.energy.stale)
+    start_energy_balance(model);
 }
 
 template <class G>

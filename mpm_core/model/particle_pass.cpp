@@ -161,8 +161,6 @@ void move_batch(Model<G>& model, const VelocityField<G>& field, const PassOption
     const bool inside =
         move_particles<D>(particles, runs[r].first, runs[r].last, model.mesh.shapes[runs[r].cell], motion);
     runs[r].out_of_order = !inside && !options.moving_cells;
-    if (affine)
-      model.energy.kinetic += kinetic_energy(particles, runs[r].first, runs[r].last);
   }
 }
 

@@ -255,7 +255,8 @@ void rest_cells(Model<G>& model, std::span<const unsigned char> chosen)
                                     std::to_string(model.fields.size()) + " velocity fields, expected one");
                  cells = rows_of_cells<G>(model.mesh, particles, model.water, chosen);
                });
-  begin_transfer(model, Transfer::flip);
+  if (!particles.resting.present) // gradients of an affine transfer
+    particles.velocity_gradient = {};
   require(particles.resting, particles.id.size());
   require(particles.velocity_gradient, particles.id.size());
   require(particles.resting_displacement, particles.id.size());

@@ -44,7 +44,7 @@ class EnergyWatch:
         speaks: whether this rank issues the warning.
         advice: what its text ends with, of energy that was generated (True) or dissipated; called on all ranks alike.
         least_steps: steps of a model before its energy is checked.
-        noisy: leave out the warning of motion against the nodes, as where particles do not cross cells.
+        noisy: leave out the warning of motion against the nodes, as where particles do not cross cells, or have no such motion.
     """
 
     limit: float | None

@@ -27,7 +27,7 @@ class Report:
     momentum: tuple[float, ...]
     """[kg m/s]"""
     kinetic_energy: float
-    """Kinetic energy of the particles"""
+    """Kinetic energy of the particles, with affine transfer that of the gradients of their velocities included (docs/energy.md)"""
     external_work: float
     """Work of gravity, tractions, contact forces and of pressures where pore water enters, since the model was made"""
     internal_work: float
@@ -49,7 +49,8 @@ class Report:
     pic_loss: float
     """Kinetic energy taken out by PIC or affine transfer; a negative one, put in, counts as unexplained too"""
     nodal_kinetic_energy: float
-    """Kinetic energy of the nodes in the last step; lower than that of the particles by their motion relative to the nodes"""
+    """Kinetic energy of the nodes in the last step; lower than that of the particles by their motion relative to the nodes, and
+    with affine transfer by the inertia of short waves"""
     unexplained_energy: float
     """External and support work, less damping, drag and friction work, PIC loss, stress work and the gain of kinetic energy: what
     the discretisation generates (negative) or dissipates (positive), since the particles were last changed by anything but a step

@@ -88,7 +88,7 @@ def test_a_tumbling_block_keeps_its_momentum_and_its_energy_adds_up(dim, scheme)
     assert np.abs(model.particles.displacement).max() > 0.4
     np.testing.assert_allclose(model.particles.mass @ model.particles.velocity, momentum, rtol=1e-12)
     assert abs(report.unexplained_fraction) < 0.01
-    # Particles have no motion that nodes do not see; the nodes' energy is more by that of the gradients within cells.
+    # Particles have no motion that nodes do not see; their energy is more by the inertia of short waves.
     assert report.nodal_kinetic_energy == pytest.approx(report.kinetic_energy, rel=0.02)
 
 
@@ -98,8 +98,9 @@ def test_a_run_goes_on_from_a_file_to_the_last_bit(tmp_path):
     first.save(tmp_path / "state.h5")
     second = thrown_block(2, lambda x: 0 * x)
     second.restore(tmp_path / "state.h5")
-    for model in (first, second):
-        run(model, 0.2, transfer=AFFINE)
+    reports = [run(model, 0.2, transfer=AFFINE) for model in (first, second)]
+    for name in ("kinetic_energy", "pic_loss", "unexplained_energy"):
+        assert getattr(reports[1], name) == pytest.approx(getattr(reports[0], name), abs=1e-9 * reports[0].energy_scale)
     for name in ("position", "velocity", "stress", "velocity_gradient"):
         np.testing.assert_array_equal(by_id(second, name), by_id(first, name))
 
@@ -127,22 +128,6 @@ def test_flip_after_an_affine_run_has_no_gradients():
 def test_what_affine_transfer_does_not_cover_is_refused_by_name(options, what):
     with pytest.raises(mpm.InputError, match=f"transfer is AFFINE.*{what}"):
         run(thrown_block(2, lambda x: x), 0.1, transfer=AFFINE, **options)
-
-
-def test_a_collapsing_heap_gets_no_energy_from_the_transfer():
-    # A steep heap that falls apart has single particles at its surface, whose gradients once gave the nodes more than they had
-    # taken, 4 % of the energy. What is missing in the balance beyond the loss is unexplained, but for half a step of works.
-    soil = mpm.MohrCoulomb(young=200e3, poisson=0.3, cohesion=500.0, friction_angle=25.0)
-    model = mpm.Model(box([32, 16], [2.0, 1.0], body=([0.0, 0.0], [0.6, 0.8]), shake=0.1), soil)
-    model.seed(density=2000.0, per_cell=6, cell_tag=1)
-    model.roller(1, normal=(1, 0))
-    model.fix(3)
-    model.set_gravity((0, -30.0))
-    report = run(model, 0.35, transfer=AFFINE, energy_limit=None)
-    missing = report.external_work - report.kinetic_energy - report.stress_work
-    assert report.pic_loss > 0
-    assert report.unexplained_energy == pytest.approx(missing - report.pic_loss, abs=0.005 * report.energy_scale)
-    assert abs(report.unexplained_fraction) < 0.02
 
 
 @pytest.mark.parametrize("dim", DIMS)
