@@ -30,22 +30,25 @@ modulus at twice the preconsolidation pressure.)");
                     "NorSand: a critical state law for sand, silt and tailings, loose (static liquefaction) or dense.",
                     R"(With p = attraction - mean stress, q = sqrt(3 J2), void ratio e and image pressure p_i:
 
-- critical state: q = M p and e = e_c(p) = critical_void_ratio - critical_compression ln(p / 1 kPa);
+- critical state: g q = M p and e = e_c(p) = critical_void_ratio - critical_compression ln(p / 1 kPa);
 - state parameter: psi_i = e - e_c(p_i);
-- yield surface: q = M_i p (1 + ln(p_i / p)) with M_i = M - coupling dilatancy abs(psi_i), at least M / 2;
-- associated flow: de_v / de_q = M_i - q / p;
-- hardening: dp_i / p_i = hardening (p_max / p_i - 1) de_q, with p_max = p exp(-dilatancy psi_i / M_i), but at least
-  0.37 p; dense sand therefore dilates at the rate dilatancy psi_i at most; under isotropic compression, where q = 0, by de_v / M_i for de_q;
+- yield surface: g q = M_i p (1 + ln(p_i / p)) with M_i = M - coupling dilatancy abs(psi_i), at least M / 2;
+- flow: g de_v / de_q = M_i - g q / p, along the deviator of the stress;
+- hardening: dp_i / p_i = hardening (p_max / p_i - 1) de_q / g, with p_max = p exp(-dilatancy psi_i / M_i), but at least
+  0.37 p; dense sand therefore dilates at the rate dilatancy psi_i / g at most; under isotropic compression, where q = 0, by de_v / M_i for de_q / g;
+- direction: g^4 = (1 + b) / 2 - (b - 1) / 2 cos(3 theta) with b = (1 + M / 3)^4 and the Lode angle theta, which is 0 in
+  triaxial compression, where g = 1, 60 degrees in triaxial extension, which has the same friction angle, and 30 degrees at
+  the critical state in plane strain;
 - elasticity: G = rigidity p, and a constant Poisson's ratio.
 
-The surface is round: M is that of triaxial compression, and holds in all other directions too. The state variables
-log_image_pressure and log_specific_volume are the logarithms of p_i (attraction included) and of 1 + e over their
-initial values; nor_sand_state gives them for points that begin with a stress and a state parameter. Soil that loosens
+The state variables log_image_pressure and log_specific_volume are the logarithms of p_i (attraction included) and of
+1 + e over their initial values; nor_sand_state gives them for points that begin with a stress and a state parameter. Soil that loosens
 keeps a pressure of a millionth of 1 kPa plus the attraction. Increments are implicit, of first order: of some 1e-3 for
 errors of a few per cent. The time step follows from the modulus at twice the largest pressure within the yield
 surface. Without the softening by rotation of principal stresses and by unloading of later versions.
 
-Source: Jefferies (1993), Geotechnique 43, 91-103; Jefferies, Been (2016), Soil Liquefaction, 2nd ed.)");
+Source: Jefferies (1993), Geotechnique 43, 91-103; Jefferies, Been (2016), Soil Liquefaction, 2nd ed.; g is that of van
+Eekelen (1980), Int. J. Numer. Anal. Methods Geomech. 4, 89-101, and Sheng, Sloan, Yu (2000), Comput. Mech. 26, 185-196.)");
 }
 
 void bind_softening(py::module_& m)

@@ -25,9 +25,12 @@ Start<3> random_start(std::mt19937& random, double size)
     stress[k] = 15e3 * normal(random);
     strain[k] = size * normal(random);
   }
-  Start<3> a{law, bulk_per_pressure(law), 1e-3, 0, 0, 0, 0, 0, deviator<3>(stress), deviator<3>(strain)};
+  Start<3> a{.law = law, .bulk = bulk_per_pressure(law), .extension = extension_of(law), .least = 1e-3};
+  a.deviator = deviator<3>(stress);
+  a.strain = deviator<3>(strain);
   a.pressure = 50e3 + 100e3 * uniform(random);
   a.image = 100e3 * (0.5 + uniform(random));
+  a.log = std::log(a.pressure / a.image);
   a.volumetric = size * normal(random);
   a.volume = 1.8;
   a.psi = -0.2 + 0.4 * uniform(random);
@@ -49,7 +52,7 @@ TEST(NorSand, NewtonFindsWhatBracketsFind)
       const Result<3> found = bracketed(a);
       EXPECT_LT(residual(a, found).cwiseAbs().maxCoeff(), 1e-9);
       EXPECT_LE(found.log, 1 + 1e-12);
-      const std::optional<Result<3>> fast = newton(a);
+      const std::optional<Result<3>> fast = newton(a, trial);
       if (!fast || found.vertex)
         continue;
       ++compared;

@@ -34,6 +34,16 @@ double radius(const SymTensor<D>& s)
   return std::sqrt(j2);
 }
 
+/// Full contraction of two tensors
+template <int D>
+double product(const SymTensor<D>& a, const SymTensor<D>& b)
+{
+  double sum = 0;
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+    sum += (k < 3 ? 1 : 2) * a[k] * b[k];
+  return sum;
+}
+
 /// The mean p and the factor r of the deviator s of a new stress p 1 + r s depend on the strain increment through the
 /// volumetric strain and through sqrt(J2) of s, whose derivative by the strain is shear * s / sqrt(J2)
 struct DeviatoricDerivatives

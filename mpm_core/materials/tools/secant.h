@@ -9,8 +9,14 @@
 
 namespace mpm::materials
 {
-/// (exp(y) - 1) / y: the secant modulus over that of the start, where y is ln of the growth of the pressure
-inline double mean_growth(double y) { return std::abs(y) < 1e-8 ? 1 + y / 2 : std::expm1(y) / y; }
+/// (exp(y) - 1) / y: the secant modulus over that of the start, where y is ln of the growth of the pressure. Most
+/// increments are small, and take its series.
+inline double mean_growth(double y)
+{
+  if (std::abs(y) > 0.01)
+    return std::expm1(y) / y;
+  return 1 + y * (1.0 / 2 + y * (1.0 / 6 + y * (1.0 / 24 + y * (1.0 / 120 + y * (1.0 / 720)))));
+}
 
 /// Its derivative
 inline double mean_growth_slope(double y)
@@ -43,10 +49,7 @@ SecantTrial<D> secant_trial(double shear, const SymTensor<D>& stress, const SymT
 template <int D>
 double q_by_shear(const SecantTrial<D>& trial, const SymTensor<D>& strain)
 {
-  double work = 0; // trial deviator : strain, a full contraction
-  for (std::size_t k = 0; k < n_stress<D>; ++k)
-    work += (k < 3 ? 1 : 2) * trial.deviator[k] * strain[k];
-  return trial.q > 0 ? 3 * work / trial.q : 0.0;
+  return trial.q > 0 ? 3 * product<D>(trial.deviator, strain) / trial.q : 0.0;
 }
 
 /// Derivatives of a new stress -p 1 + r s, with the trial deviator s and pressures positive in compression
@@ -57,6 +60,16 @@ struct SecantSlopes
   double ratio;    ///< of r
 };
 
+/// Derivative of the stress by what the slopes are derivatives by
+template <int D>
+SymTensor<D> stress_slope(const SecantTrial<D>& trial, const SymTensor<D>& strain, double ratio, const SecantSlopes& by)
+{
+  SymTensor<D> slope;
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+    slope[k] = 2 * ratio * strain[k] * by.shear + trial.deviator[k] * by.ratio - (k < 3 ? by.pressure : 0.0);
+  return slope;
+}
+
 /// Writes the tangent of -p 1 + r s.
 /// @param by_volume  derivatives by the volumetric strain, positive in compression
 /// @param by_q       derivatives by q of the trial at a fixed shear modulus
@@ -66,15 +79,28 @@ void write_secant_tangent(const SecantTrial<D>& trial, const SymTensor<D>& strai
 {
   constexpr std::size_t n = n_stress<D>;
   const double q_by_strain = trial.q > 0 ? 3 * trial.shear / trial.q : 0.0;
+  const SymTensor<D> volumetric = stress_slope<D>(trial, strain, ratio, by_volume);
+  const SymTensor<D> deviatoric = stress_slope<D>(trial, strain, ratio, by_q);
   for (std::size_t i = 0; i < n; ++i)
     for (std::size_t j = 0; j < n; ++j)
     {
-      const double volume = j < 3 ? -1.0 : 0.0, q = q_by_strain * trial.deviator[j];
-      const auto total = [&](double SecantSlopes::*s) { return by_volume.*s * volume + by_q.*s * q; };
       const double projected = (i == j ? (i < 3 ? 1.0 : 0.5) : 0.0) - (i < 3 && j < 3 ? 1.0 / 3 : 0.0);
-      tangent[i * n + j] = 2 * ratio * (trial.shear * projected + strain[i] * total(&SecantSlopes::shear)) +
-                           trial.deviator[i] * total(&SecantSlopes::ratio) -
-                           (i < 3 ? total(&SecantSlopes::pressure) : 0.0);
+      tangent[i * n + j] = 2 * ratio * trial.shear * projected - (j < 3 ? volumetric[i] : 0.0) +
+                           deviatoric[i] * q_by_strain * trial.deviator[j];
     }
+}
+
+/// Adds what the tangent of -p 1 + r s has from one more number that the trial deviator decides.
+/// @param by           derivatives by the number, at a fixed volumetric strain and q of the trial
+/// @param by_deviator  derivative of the number by the trial deviator, itself a deviator
+template <int D>
+void add_secant_tangent(const SecantTrial<D>& trial, const SymTensor<D>& strain, double ratio, const SecantSlopes& by,
+                        const SymTensor<D>& by_deviator, double* tangent)
+{
+  constexpr std::size_t n = n_stress<D>;
+  const SymTensor<D> stress = stress_slope<D>(trial, strain, ratio, by);
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j)
+      tangent[i * n + j] += stress[i] * 2 * trial.shear * by_deviator[j];
 }
 } // namespace mpm::materials

@@ -121,7 +121,8 @@ def nor_sand_state(
             f"{void_ratio[wrong][0]:g}, expected a positive one"
         )
     fall, log_image = law.coupling * law.dilatancy, np.zeros_like(pressure)
-    for _ in range(100):  # q = M_i p (1 + ln(p_i / p)), where M_i depends a little on p_i
+    q *= _direction_factor(law, floats("stress", stress, (None, None)), q)
+    for _ in range(100):  # g q = M_i p (1 + ln(p_i / p)), where M_i depends a little on p_i
         slope = law.critical_slope - fall * np.abs(psi + law.critical_compression * log_image)
         log_image = q / (pressure * np.maximum(slope, law.critical_slope / 2)) - 1
     image = overconsolidation * pressure * np.exp(log_image)
@@ -145,3 +146,15 @@ def _pressure_and_q(law: CamClay | NorSand, stress: ArrayLike) -> tuple[NDArray[
         raise InputError(f"stress has the mean {mean.max():g} Pa, expected below the attraction, {law.attraction:g} Pa")
     squares = ((s[:, :3] - mean[:, None]) ** 2).sum(axis=1) + 2 * (s[:, 3:] ** 2).sum(axis=1)
     return pressure, np.sqrt(1.5 * squares)
+
+
+def _direction_factor(law: NorSand, stress: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """G of NorSand in the direction of stresses [-], shape (n,), by which q counts more than in triaxial compression."""
+    s = np.zeros((len(stress), 6))
+    s[:, : stress.shape[1]] = stress
+    s[:, :3] -= s[:, :3].mean(axis=1, keepdims=True)
+    s /= np.where(q > 0, q, 1.0)[:, None]
+    determinant = np.linalg.det(s[:, [[0, 3, 5], [3, 1, 4], [5, 4, 2]]])
+    cosine = np.where(q > 0, np.clip(-13.5 * determinant, -1.0, 1.0), 1.0)  # cos(3 theta)
+    extension = (1 + law.critical_slope / 3) ** 4
+    return np.asarray((0.5 * (1 + extension - (extension - 1) * cosine)) ** 0.25)
