@@ -60,8 +60,8 @@ def test_both_end_in_the_same_place_when_the_load_rises_slowly():
     assert ends == pytest.approx([LOAD, LOAD], rel=0.01)
 
 
-@pytest.mark.parametrize("dilation_angle, nmd, told", [(10.0, True, True), (0.0, True, False), (10.0, False, False)])
-def test_advice_on_energy_names_averaged_strains_where_soil_dilates(dilation_angle, nmd, told):
+@pytest.mark.parametrize("dilation_angle, nmd, advice", [(10.0, True, True), (0.0, True, False), (10.0, False, False)])
+def test_advice_on_energy_names_averaged_strains_where_soil_dilates(dilation_angle, nmd, advice):
     # Backward Euler dissipates the waves of a sudden load, so that any of these runs passes the limit of 2 %.
     soil = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=25.0, dilation_angle=dilation_angle)
     model = mpm.Model(box((4, 4)), soil)
@@ -70,18 +70,18 @@ def test_advice_on_energy_names_averaged_strains_where_soil_dilates(dilation_ang
     model.set_gravity((0.0, -9.81))
     with pytest.raises(mpm.RunError, match="above energy_limit, 2 %") as error:
         model.implicit(1.0, dt=0.02, nmd=nmd, energy_limit=0.02).last()
-    assert ("nmd=True generate energy where soil dilates" in str(error.value)) == told
+    assert ("nmd=True generate energy where soil dilates" in str(error.value)) == advice
 
 
 @pytest.mark.parametrize(
-    "nmd, generated, told, not_told",
+    "nmd, generated, advice, other",
     [
         (True, True, "initialise nmd=False", "shorter steps"),
         (False, True, "docs/energy.md", "backward Euler"),
         (True, False, "shorter steps, dissipate less", "initialise"),
     ],
 )
-def test_advice_on_energy_that_was_generated_is_not_that_on_dissipated_energy(nmd, generated, told, not_told):
+def test_advice_on_energy_that_was_generated_is_not_that_on_dissipated_energy(nmd, generated, advice, other):
     # Backward Euler dissipates. Energy that is generated comes from averaged strains beside forces that are not averaged.
     model = mpm.Model(box((4, 4)), mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=25.0))
     model.seed(density=2000.0, per_cell=6)
@@ -91,4 +91,4 @@ def test_advice_on_energy_that_was_generated_is_not_that_on_dissipated_energy(nm
     with pytest.warns(mpm.EnergyWarning) as caught:
         watch.look(report)
     text = str(caught[0].message)
-    assert ("was generated" in text) == generated and told in text and not_told not in text
+    assert ("was generated" in text) == generated and advice in text and other not in text
