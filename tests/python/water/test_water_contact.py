@@ -18,15 +18,20 @@ def degree_of_terzaghi(factor):
     return 1 - np.sum(2 / m**2 * np.exp(-(m**2) * factor))
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.5])
-def test_a_column_on_a_plane_consolidates_as_terzaghi_has_it(friction):
-    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (0.2, 1.0), (2, 20))
+def column_on_a_plane(width, counts, **plane):
+    """A column 1 m high between smooth walls, whose lowest particles touch a plane."""
+    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (width, 1.0), counts)
     model = mpm.Model(bridge.background_mesh(domain, None, facet_tags), ELASTIC)
     model.seed(density=2000.0, per_cell=3)
     for side in (1, 2):
         model.roller(side, (1, 0))
     gap = model.gap(mpm.Plane((0, 0), normal=(0, 1)))
-    base = model.add_contact(mpm.Plane((0, gap - 1e-12), normal=(0, 1)), friction=friction)
+    return model, model.add_contact(mpm.Plane((0, gap - 1e-12), normal=(0, 1)), **plane)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_a_column_on_a_plane_consolidates_as_terzaghi_has_it(friction):
+    model, base = column_on_a_plane(0.2, (2, 20), friction=friction)
     model.add_water(porosity=0.4, conductivity=1e-8, modulus=np.inf)
     load = 10e3
     model.hold_pore_pressure(4, 0.0)
@@ -66,13 +71,7 @@ def sliding_base(base):
 def test_a_surface_rubs_by_the_load_less_the_pore_pressure(water):
     """A total load q on a column with the pore pressure u: the shear stress is mu (q - u), also under suction. The particles
     are not on a grid, and cover only 0.8 of the plane."""
-    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (0.4, 1.0), (4, 10))
-    model = mpm.Model(bridge.background_mesh(domain, None, facet_tags), ELASTIC)
-    model.seed(density=2000.0, per_cell=3)
-    for side in (1, 2):
-        model.roller(side, (1, 0))
-    gap = model.gap(mpm.Plane((0, 0), normal=(0, 1)))
-    base = model.add_contact(mpm.Plane((0, gap - 1e-12), normal=(0, 1)), friction=MU, velocity=(1e-4, 0.0))
+    model, base = column_on_a_plane(0.4, (4, 10), friction=MU, velocity=(1e-4, 0.0))
     model.add_water(porosity=0.4, conductivity=1e-4, modulus=np.inf)
     model.hold_pore_pressure(4, water)
     model.press_surface(4, 10e3)
