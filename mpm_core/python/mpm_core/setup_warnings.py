@@ -11,7 +11,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from . import _core
-from .mesh import cell_sizes
+from .water_checks import undrained_friction
 
 if TYPE_CHECKING:
     from .model import Model
@@ -65,7 +65,7 @@ def warn_of_setup(model: Model, nmd: bool, damping: float = 0.0, until: float = 
         *_reversed_interfaces(model),
         _damped_waves(model, damping),
         _tilted_water(model),
-        _undrained_friction(model, until),
+        undrained_friction(model, until),
     )
     found = [text for text in (*of_loads, *of_laws, *of_sides) if text]
     if model.comm.rank == 0:
@@ -267,25 +267,6 @@ def _outside_of_surface(model: Model, kind: Any) -> str:
     if not outside:
         return ""
     return f"stresses of {outside / total:.1%} of the particles of {kind.__name__} {SURFACES[kind]}"
-
-
-def _undrained_friction(model: Model, until: float) -> str:
-    """Of friction on rigid surfaces where the pore pressure beside them has no time to follow the load; empty for others. Collective."""
-    water = model._core.water
-    if water is None or not any(contact["friction"] > 0 for contact in model._contacts):
-        return ""
-    of_cells = (
-        cell_sizes(model.mesh.cell_volumes, model.mesh.dim)[model.particles.cell] ** 2 / model.particles.conductivity
-    )
-    modulus = max(law.p_wave_modulus for law in model.laws)
-    fastest = model.comm.allreduce(of_cells.min(initial=np.inf), MPI.MIN)
-    drains = fastest * water.density * _core.laboratory_gravity / modulus
-    if not until < drains:
-        return ""
-    return (
-        f"the pore water needs {drains:.3g} s to flow through a cell and the run ends at {until:.3g} s: the friction of soil that does not "
-        "drain on rigid surfaces is uncertain by half; adhesion does not depend on the pore pressure (docs/contact.md)"
-    )
 
 
 def angles_in_radians(laws: Iterable[Any]) -> str:

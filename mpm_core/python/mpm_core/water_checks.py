@@ -6,13 +6,16 @@ import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from . import _core
 from ._core import InputError
 from .checks import positive
+from .mesh import cell_sizes
 
 if TYPE_CHECKING:
+    from .model import Model
     from .pore_water import PoreWater
 
 LABORATORY_GRAVITY: float = _core.laboratory_gravity
@@ -59,3 +62,22 @@ def require_soil(model: PoreWater) -> None:
             f"density of a particle is {density[light][0]:g} kg/m3, expected more than that of the water in its pores, "
             f"{of_water[light][0]:g} kg/m3 of soil; densities are of the saturated soil"
         )
+
+
+def undrained_friction(model: Model, until: float) -> str:
+    """What a warning says of friction where the pore pressure has no time to follow the load; empty for others. Collective."""
+    water = model._core.water
+    if water is None or not any(contact["friction"] > 0 for contact in model._contacts):
+        return ""
+    of_cells = (
+        cell_sizes(model.mesh.cell_volumes, model.mesh.dim)[model.particles.cell] ** 2 / model.particles.conductivity
+    )
+    modulus = max(law.p_wave_modulus for law in model.laws)
+    fastest = model.comm.allreduce(of_cells.min(initial=np.inf), MPI.MIN)
+    drains = fastest * water.density * LABORATORY_GRAVITY / modulus
+    if not until < drains:
+        return ""
+    return (
+        f"the pore water needs {drains:.3g} s to flow through a cell and the run ends at {until:.3g} s: the friction of soil that does not "
+        "drain on rigid surfaces is uncertain by half; adhesion does not depend on the pore pressure (docs/contact.md)"
+    )
