@@ -32,6 +32,7 @@ from common.plots import CURVES, Scene, colour_limits, save_particles
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
+from common.schemes import INTEGRATIONS
 from common.soils import add_parameter
 from mpi4py import MPI
 
@@ -44,7 +45,7 @@ GRAINS = 2650.0
 FRONT = 0.01
 """Part of the soil that lies beyond its front"""
 NOR_SAND = {"critical_void_ratio": 1.0, "critical_compression": 0.03, "critical_slope": 1.25, "dilatancy": 4.0, "hardening": 100.0,
-            "rigidity": 200.0, "coupling": 0.2, "attraction": 100.0}  # fmt: skip
+            "rigidity": 200.0, "coupling": 0.2, "attraction": 1000.0}  # fmt: skip
 """Parameters of NorSand that are options, of which the attraction [Pa] keeps some strength at the surface"""
 COLUMNS = ["time_s", "runout_m", "crest_settlement_m", "pressure_ratio", "volume_gain", "water_out_m2", "fastest_m_per_s",
            "kinetic_energy_J", "unexplained_fraction_of_energy", "dt_s"]  # fmt: skip
@@ -162,15 +163,24 @@ def raise_pressures(a: Namespace, model: mpm.Model) -> None:
     model.set_pore_pressure(lambda x: WATER * GRAVITY * depth(a, x))
     p.set("stress", -buoyant * depth(a, p.position)[:, None] * np.array([0.5, 1.0, 0.5, 0.0]))
     if a.material == "nor-sand":
-        for name, values in mpm.nor_sand_state(model.laws[0], p.stress, a.state_parameter).items():
-            model.set_state(name, values)
-    model.equilibrate(integration=mpm.Integration.MIXED)
+        set_state(a, model, overconsolidation=10.0)  # elastic: on the way to equilibrium it would compact, and be less loose
+        model.equilibrate(integration=INTEGRATIONS[a.integration], nmd=a.nmd)
+        set_state(a, model)
+    else:  # soil at yield: equilibrium of averaged forces takes too many steps, and the start moves it by less than 1 mm
+        model.equilibrate(integration=INTEGRATIONS[a.integration])
     p.set("initial_position", p.position)  # displacements count from here
     raised = np.maximum(-a.pressure_ratio * p.stress[:, 1], 0.0)
     p.set("pore_pressure", p.pore_pressure + raised)
     # Each by its fraction: the same decrease of all would end in tension to the sides.
     left = 1 - a.pressure_ratio * np.array([1.0, 1.0, 1.0, 0.0])
     p.set("stress", left * p.stress)
+
+
+def set_state(a: Namespace, model: mpm.Model, overconsolidation: float = 1.0) -> None:
+    """Give NorSand its state parameter at the present stresses, which its yield surfaces pass through unless it is overconsolidated."""
+    states = mpm.nor_sand_state(model.laws[0], model.particles.stress, a.state_parameter, overconsolidation)
+    for name, values in states.items():
+        model.set_state(name, values)
 
 
 # --- 3. The slide ----------------------------------------------------------------------------------------------------

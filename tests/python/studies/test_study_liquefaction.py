@@ -110,17 +110,32 @@ def test_sand_that_hardly_drains_runs_out_as_far_as_the_law_of_undrained_soil_le
 
 
 def test_loose_sand_flows_where_dense_sand_rests(tmp_path):
-    """Pore pressures that take half of the effective stresses leave twice the shear stress over them, tan 10 / (1 - 0.5) = 0.35, below
+    """Pore pressures that take half of the effective stresses leave twice the shear stress over them, tan 12 / (1 - 0.5) = 0.43, below
     the friction of a layer at the critical state in plane strain, M / (sqrt(3) g) = 0.57: only sand that contracts loses the rest of
-    its strength.
+    its strength. Under the pore pressures of the start loose sand rests as well, since it starts in equilibrium.
     """
-    nor_sand = ["--material", "nor-sand", "--angle", "10", "--pressure-ratio", "0.5", "--time", "4"]
+    nor_sand = ["--material", "nor-sand", "--pressure-ratio", "0.5", "--time", "4"]
     loose = slid(tmp_path / "loose", *nor_sand)
     assert loose["runout_m"] > 1.0 and loose["crest_settlement_m"] > 0.4
     dense = slid(tmp_path / "dense", *nor_sand, "--state-parameter", "-0.05")
     assert abs(dense["runout_m"]) < 0.01 and abs(dense["crest_settlement_m"]) < 0.01
     at_rest = slid(tmp_path / "at_rest", *nor_sand, "--pressure-ratio", "0")
-    assert abs(at_rest["runout_m"]) < 0.01
+    assert abs(at_rest["runout_m"]) < 1e-3 and abs(at_rest["crest_settlement_m"]) < 1e-3
+
+
+def test_loose_sand_starts_in_equilibrium_with_its_state_parameter():
+    """The void ratio is that of the critical state at the mean effective stress at rest plus the state parameter, and equilibrium
+    changes the volume by little."""
+    a = study.parse(["--material", "nor-sand", "--pressure-ratio", "0", "--cell-size", "0.5"])
+    model = study.build(a)
+    p, law = model.particles, model.laws[0]
+    pressure = law.attraction - p.stress[:, :3].mean(axis=1)
+    critical = law.critical_void_ratio - law.critical_compression * np.log(pressure / 1e3)
+    specific_volume = (1 + law.void_ratio) * np.exp(p.state[:, law.state_names.index("log_specific_volume")])
+    assert specific_volume - 1 - critical == pytest.approx(a.state_parameter, abs=1e-9)
+    area = a.height * (a.crest + 0.5 * a.height / np.tan(np.radians(a.angle)))
+    assert p.volume.sum() == pytest.approx(area, rel=1e-3)
+    assert model.report().unbalanced_ratio < 1e-6
 
 
 @pytest.mark.parametrize(
