@@ -32,6 +32,7 @@ from fenics_bridge.mesh.soil import soil_mesh
 from fenics_bridge.transfer.comparison import Difference, compare
 from fenics_bridge.transfer.far_field import FarField
 from fenics_bridge.transfer.handover import Handover, initialise
+from fenics_bridge.transfer.particle_forces import boundary_forces, seepage_forces
 from fenics_bridge.transfer.particle_safety import ParticleSafety, particle_safety
 from fenics_bridge.transfer.particle_site import ParticleSite, apply_supports
 
@@ -40,12 +41,12 @@ __all__ = [
     "BASE", "BODY", "CREST", "EMPTY", "LEFT", "PRACTICE", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference",
     "ElasticSolution", "EquilibriumReport", "FarField", "FemSite", "Geometry", "Handover", "InputError", "Load", "LoadStep",
     "LogSpiral", "MixedQuasiStatic", "ParticleSafety", "ParticleSite", "PointSearch", "QuasiStatic", "Solver", "Stage",
-    "StageError", "StageReport", "Support", "apply_supports", "background_arrays", "background_mesh", "box_mesh",
-    "carry_out", "collapse_load", "compare", "davis_reduced_strength", "davis_strength", "evaluate_at",
+    "StageError", "StageReport", "Support", "apply_supports", "background_arrays", "background_mesh", "boundary_forces",
+    "box_mesh", "carry_out", "collapse_load", "compare", "davis_reduced_strength", "davis_strength", "evaluate_at",
     "factor_of_safety", "fixed", "flat_normal", "graded_tags", "hydrostatic", "initialise", "k0_elastic", "k0_jaky",
     "k0_layered_stress", "k0_stress", "log_spiral", "log_spiral_safety", "name_tags", "names_of", "nodal_average",
     "original_cells", "particle_safety", "prescribed", "print_step", "read_mesh", "reduced_strength", "roller",
-    "slope_mesh", "soil_mesh", "solve_elastic", "solve_nearly_incompressible",
+    "seepage_forces", "slope_mesh", "soil_mesh", "solve_elastic", "solve_nearly_incompressible",
 ]
 # fmt: on
 

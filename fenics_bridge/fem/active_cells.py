@@ -130,12 +130,14 @@ def _nodal_pressure(domain: Mesh, pore_pressure: Any) -> Any:
     return p
 
 
-def pressures_at(comm: MPI.Comm, pore_pressure: OfPosition, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Pore pressures (n,) [Pa] at positions (n, D) [m]; raises InputError, on all ranks, for other values. Collective."""
-    given = real_numbers(comm, "pore_pressure", pore_pressure(x))
+def pressures_at(
+    comm: MPI.Comm, pressure: OfPosition, x: NDArray[np.float64], name: str = "pore_pressure"
+) -> NDArray[np.float64]:
+    """Pressures (n,) [Pa] at positions (n, D) [m]; raises InputError, on all ranks, for other values. Collective."""
+    given = real_numbers(comm, name, pressure(x))
     good = given.shape in ((), (len(x),))
-    agree(comm, None if good else f"pore_pressure gives values of shape {given.shape}, expected ({len(x)},)")
-    agree(comm, None if np.all(np.isfinite(given)) else "pore_pressure gives values that are not finite")
+    agree(comm, None if good else f"{name} gives values of shape {given.shape}, expected ({len(x)},)")
+    agree(comm, None if np.all(np.isfinite(given)) else f"{name} gives values that are not finite")
     return np.broadcast_to(given, len(x))
 
 

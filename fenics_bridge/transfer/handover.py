@@ -23,11 +23,24 @@ from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.transfer.dried import balance_dried_soil
 from fenics_bridge.transfer.moved import cell_gradient, fitted_volumes, held_volumes, volume_change
+from fenics_bridge.transfer.pore_pressures import (
+    add_to_stress,
+    set_pore_pressure,
+    skeleton_of,
+    stands_on_surface,
+    takes_pore_pressure,
+)
 from fenics_bridge.water.consolidation import Consolidation
 
 SAME_WEIGHT = 0.01
 """Relative difference of unit weights up to which they count as the same"""
 
+_OF_LOADS = 'Model.traction, load_surface, particles.set("traction", ...) or fix'
+_REMEDIES = {
+    "pore pressure": "pore water (Model.add_water), laws that are Undrained, or as traction the bridge.seepage_forces",
+    "the pressure of water that stands on the surface": "Model.stand_water with pore water, else as traction the bridge.boundary_forces",
+}
+"""How particles are given a load of finite elements"""
 _BALANCED, _MOST_STEPS = 5e-4, 60
 """Out-of-balance ratio to reach, and largest number of steps: near collapse each one leaves a fraction of it."""
 
@@ -86,8 +99,10 @@ def initialise(
 
     Args:
         model: model with particles.
-        fem: finite elements, solved and converged; the meshes and their partitions may differ. Where particles have pore water
-            (`Model.add_water`) a `water.Consolidation` as it is, whose pore pressures they take too; `equilibrate` keeps these.
+        fem: finite elements, solved and converged; the meshes and their partitions may differ. Particles with pore water
+            (`Model.add_water`) take their pore pressures too, from a `water.Consolidation` or from a `QuasiStatic` with prescribed
+            ones, and `equilibrate` keeps these. Particles of `Undrained` laws, whose skeletons are the laws of a `QuasiStatic`
+            with prescribed pore pressures, take total stresses, and the pressures as their `excess_pore_pressure`.
         count_displacement: let displacements of particles include those of the finite elements; otherwise they start from zero.
         move: move particles with the body, by its displacement; otherwise they stay where they are, with their volume.
             Volumes of particles that move change with the body's, and are then fitted to what each cell of their mesh holds
@@ -162,6 +177,11 @@ def _take_stress_and_state(model: mpm.Model, fem: Any, search: PointSearch, smoo
     if isinstance(fem, (QuasiStatic, Consolidation)):
         values = search.values(fem.state_function())
         state[:, : values.shape[1]] = values
+    if takes_pore_pressure(model, fem):
+        if model._core.water is not None:
+            set_pore_pressure(model, fem, search)
+        else:
+            add_to_stress(model, fem, search, smooth, stress, state)
     if isinstance(fem, Consolidation):
         particles.set("pore_pressure", search.values(fem.pressure)[:, 0])
         particles.set("pressure_gradient", search.values(cell_gradient(fem.pressure)))
@@ -221,16 +241,22 @@ def _require_usable(
         if model.comm.allreduce(len(model.particles))
         else "model has no particles, expected some: seed them before",
     )
-    fits = (model._core.water is not None) == isinstance(fem, Consolidation)
-    problem = (
-        f"fem is a {type(fem).__name__}, expected a water.Consolidation where particles have pore water (Model.add_water), "
-        "and another one where they have none"
-    )
-    agree(model.comm, None if fits else problem)
+    agree(model.comm, _water_mistake(model, fem))
     agree(model.comm, _not_equilibrated(model, integration) if equilibrate else None)
     agree(model.comm, _rising_gravity(model))
     known = not move or hasattr(model.mesh, "domain")
     agree(model.comm, None if known else "model: to move particles its mesh must come from `background_mesh`")
+
+
+def _water_mistake(model: mpm.Model, fem: Any) -> str | None:
+    """Why pore water of particles and finite elements do not fit together, in words; None if they do."""
+    name, wet, coupled = type(fem).__name__, model._core.water is not None, isinstance(fem, Consolidation)
+    if wet and not coupled and not takes_pore_pressure(model, fem):
+        return (
+            f"fem is a {name} without pore pressures, expected a QuasiStatic with them (reconfigure) or a water.Consolidation, since "
+            "particles have pore water (Model.add_water)"
+        )
+    return None if wet or not coupled else f"fem is a {name}, expected particles with pore water (Model.add_water)"
 
 
 def _not_equilibrated(model: mpm.Model, integration: mpm.Integration | None) -> str | None:
@@ -295,7 +321,10 @@ def _warn_of_missing_loads(model: mpm.Model, fem: Any) -> None:
         name for name in ("pressure", "traction") if any(np.any(value) for value in getattr(load, name).values())
     ]
     if fem.largest_pore_pressure() > 0:
-        missing.append("pore pressure")
+        if not takes_pore_pressure(model, fem):
+            missing.append("pore pressure")
+        elif stands_on_surface(fem) and not (model._core.water is not None and model._core.water.standing):
+            missing.append("the pressure of water that stands on the surface")
     if comm.allreduce(float(np.abs(model.particles.traction).max(initial=0.0)), MPI.MAX) > 0 or model._contacts:
         missing = []
     held = {condition[0] for condition in model._conditions}
@@ -307,7 +336,7 @@ def _warn_of_missing_loads(model: mpm.Model, fem: Any) -> None:
     if missing and comm.rank == 0:
         warnings.warn(
             f"the finite elements carry {', '.join(missing)}, which the particles do not, so that the stresses do not "
-            'balance their loads: give it to them first, by Model.traction, load_surface, particles.set("traction", ...) or fix',
+            f"balance their loads: give it to them first, by {'; '.join(_REMEDIES.get(name, _OF_LOADS) for name in missing)}",
             RuntimeWarning,
             stacklevel=3,
         )
@@ -321,9 +350,11 @@ def _require_same_laws(model: mpm.Model, fem: Any, number: Any) -> None:
         fem: the finite elements.
         number: number of the law that the finite elements have at each particle, shape (n,).
     """
-    laws = fem.laws
+    laws, own = fem.laws, model.laws
+    if takes_pore_pressure(model, fem):
+        own = [skeleton_of(law) for law in own]
     pairs = np.unique(np.column_stack([model.particles.material, number]), axis=0)
-    mistakes = (_law_mistake(material, model.laws[material], laws[there]) for material, there in pairs)
+    mistakes = (_law_mistake(material, own[material], laws[there]) for material, there in pairs)
     agree(model.comm, next((mistake for mistake in mistakes if mistake), None))
 
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
+from mpm_core.collective import collectively
+from numpy.typing import ArrayLike, NDArray
 
 import mpm_core as mpm
 from fenics_bridge.errors import agree
@@ -15,32 +16,45 @@ from fenics_bridge.types import OfPosition
 from mpm_core import Geometry
 
 
-def boundary_forces(model: mpm.Model, tag: int, pressure: float) -> NDArray[np.float64]:
+def boundary_forces(model: mpm.Model, facet_tag: int | str, pressure: float | OfPosition) -> NDArray[np.float64]:
     """Force on each particle by a pressure on the boundary with a tag. Collective.
 
-    A boundary is pressed where there are particles on one side of it only, by those of a cell that are nearest to it.
+    A boundary is pressed where there are particles on one side of it only, by those of a cell that are nearest to it. As fields of
+    particles the forces move with them: set them anew as they move.
 
     Args:
         model: the particles.
-        tag: number of the tag.
-        pressure: pressure [Pa], compression positive.
+        facet_tag: number or name of the tag.
+        pressure: pressure [Pa], compression positive, or function of positions (n, D) [m] that returns pressures (n,) [Pa], such as
+            `hydrostatic` for water that stands over the soil.
 
     Returns:
         Shape (n, D) [N], [N/m] in plane strain, [N] per radian in an axisymmetric body.
 
     Raises:
-        InputError: no soil lies at the boundary. Raised on all ranks alike.
+        InputError: no soil lies at the boundary, or pressures that are not finite or of another shape. Raised on all ranks alike.
+
+    Example:
+        >>> model.particles.set("traction", boundary_forces(model, SLOPE, hydrostatic(1.5)))
     """
     mesh = model.mesh
-    force, pressed = _surface_forces(model, mesh._core.facet_tags == tag, np.full(len(mesh.points), float(pressure)))
-    agree(model.comm, None if pressed else f"pressure: no soil lies at the boundary with the tag {tag}")
+    tags = collectively(model.comm, lambda: mesh.tags_of("facet", facet_tag))
+
+    def at(x: NDArray[np.float64]) -> ArrayLike:
+        return pressure(x) if callable(pressure) else pressure
+
+    nodal = pressures_at(model.comm, at, mesh.points, "pressure")
+    force, pressed = _surface_forces(model, np.isin(mesh._core.facet_tags, tags), nodal)
+    agree(model.comm, None if pressed else f"pressure: no soil lies at the boundary with the tag {facet_tag!r}")
     return force
 
 
 def seepage_forces(model: mpm.Model, pore_pressure: OfPosition) -> NDArray[np.float64]:
     """Force -V grad p of the pore water on each particle, p being linear in each cell. Collective.
 
-    As for the finite elements, water presses on the surface where it stands on it, and suction does not pull at it.
+    For drained soil whose pore pressures stay as they are in space: the laws are then those of effective stresses. As for the
+    finite elements, water presses on the surface where it stands on it, and suction does not pull at it: the particles next
+    to the surface carry this part. Set the forces anew as particles move.
 
     Args:
         model: the particles.
@@ -51,6 +65,9 @@ def seepage_forces(model: mpm.Model, pore_pressure: OfPosition) -> NDArray[np.fl
 
     Raises:
         InputError: pore pressures of another shape or not finite. Raised on all ranks alike.
+
+    Example:
+        >>> model.particles.set("traction", seepage_forces(model, flow.pore_pressure()))
     """
     mesh, cells = model.mesh, model.particles.cell
     p = pressures_at(model.comm, pore_pressure, mesh.points)

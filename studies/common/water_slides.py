@@ -16,7 +16,6 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
-from fenics_bridge.transfer.particle_forces import seepage_forces
 from fenics_bridge.water import Reservoir
 from fenics_bridge.water.boundary import value_at
 from particle_player import Movie
@@ -153,7 +152,7 @@ def handed_over(
     nodal = pressure(model.mesh.points)
 
     def act() -> None:
-        model.particles.set("traction", seepage_forces(model, lambda points: nodal))
+        model.particles.set("traction", bridge.seepage_forces(model, lambda points: nodal))
 
     act()
     handover = bridge.initialise(model, fem, count_displacement=False, nmd=nmd)

@@ -5,6 +5,7 @@ import pytest
 from mpi4py import MPI
 
 import fenics_bridge as bridge
+import mpm_core as mpm
 from fenics_bridge import water
 
 WEIGHT = 9810.0
@@ -59,3 +60,34 @@ def test_standing_water_loads_the_pores_alike_on_every_number_of_ranks():
         heads.append(bridge.evaluate_at(points, p=flow.pressure_head)["p"][:, 0])
         heads[-1] = np.append(heads[-1], flow.stored_water())
     assert heads[1] == pytest.approx(heads[0], rel=1e-8, abs=1e-8)
+
+
+@pytest.mark.parametrize("wet", [False, True])
+def test_prescribed_pressures_are_handed_over_alike_on_any_number_of_ranks(wet):
+    """Pore pressures of finite elements become pore water, or a part of the total stress; both are in balance on the same cells."""
+    soil = mpm.MohrCoulomb(young=2e7, poisson=0.3, cohesion=6e3, friction_angle=28.0)
+    law = soil if wet else mpm.Undrained(soil, water_modulus=2e8, porosity=0.4)
+    supports, results = [bridge.fixed(bridge.BASE), bridge.roller(bridge.LEFT, (1, 0))], []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        background = bridge.slope_mesh(comm, height=4.0, angle=45.0, crest=4.0, cell_size=0.5)
+        body, _, facets = bridge.soil_mesh(*background)
+        fem = bridge.QuasiStatic(body, soil, facets, supports, degree=1)
+        fem.reconfigure(pore_pressure=lambda x: WEIGHT * (2.0 - 0.25 * x[:, 0] - x[:, 1]))
+        fem.solve(bridge.Load(unit_weight=20e3))
+        model = mpm.Model(bridge.background_mesh(*background), law)
+        model.seed(density=20e3 / 9.81, per_cell=3, cell_tag=bridge.SOIL)
+        bridge.apply_supports(model, supports)
+        model.set_gravity((0.0, -9.81))
+        if wet:
+            model.add_water(porosity=0.4, conductivity=1e-9)
+        assert bridge.initialise(model, fem).unbalanced_ratio < 1e-9
+        p = model.particles
+        pressure = p.pore_pressure if wet else model.state("excess_pore_pressure")
+        sums = [
+            p.volume @ pressure,
+            p.volume @ pressure**2,
+            p.volume @ p.stress[:, 1],
+            p.volume @ p.stress[:, 3] ** 2,
+        ]
+        results.append(comm.allreduce(np.array(sums)))
+    assert results[1] == pytest.approx(results[0], rel=1e-6)

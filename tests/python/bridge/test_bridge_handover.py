@@ -23,7 +23,6 @@ import mpm_core as mpm
 from fenics_bridge import compat
 from fenics_bridge.mesh.tagged import cell_volumes
 from fenics_bridge.transfer.moved import fitted_volumes, held_volumes, simplex_samples
-from fenics_bridge.transfer.particle_forces import seepage_forces
 
 UNIT_WEIGHT = 18e3
 
@@ -264,7 +263,7 @@ def test_particles_of_another_weight_are_said(weight, said):
         ({"pore_pressure": lambda x: 0 * x[:, 0]}, None, ""),
         (
             {"pore_pressure": bridge.hydrostatic(1.0)},
-            lambda model: model.particles.set("traction", seepage_forces(model, bridge.hydrostatic(1.0))),
+            lambda model: model.particles.set("traction", bridge.seepage_forces(model, bridge.hydrostatic(1.0))),
             "",
         ),
         ({"displacement": 1.0}, None, "prescribed displacement at 4"),

@@ -179,10 +179,10 @@ def test_water_with_a_velocity_of_its_own_is_refused_before_particles_change():
 
 def test_dry_particles_are_refused():
     fem, model = consolidating()
-    with pytest.raises(mpm.InputError, match="expected a water.Consolidation where particles have pore water"):
+    with pytest.raises(mpm.InputError, match="fem is a Consolidation, expected particles with pore water"):
         bridge.initialise(model, fem)
     wet(model)
     elastic = bridge.QuasiStatic(fem.domain, SOIL, fem._facet_tags, [bridge.fixed(BASE)])
     elastic.solve(bridge.Load(unit_weight=1e3))
-    with pytest.raises(mpm.InputError, match="is a QuasiStatic"):
+    with pytest.raises(mpm.InputError, match="is a QuasiStatic without pore pressures, expected a QuasiStatic with them"):
         bridge.initialise(model, elastic)

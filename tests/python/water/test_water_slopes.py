@@ -113,15 +113,14 @@ def test_suction_adds_to_effective_stress_and_does_not_pull_at_the_surface():
 def test_suction_presses_particles_at_the_surface_as_it_does_finite_elements():
     # Under a uniform suction s the pores of a block push on its free surface alone: s times its width from above, and nothing
     # on the whole of a block that is free all around.
-    from fenics_bridge.transfer.particle_forces import seepage_forces
 
     domain, cell_tags, facet_tags = bridge.box_mesh(comm, (4.0, 3.0), (8, 6), body=((1.0, 1.0), (3.0, 2.0)))
     model = mpm.Model(bridge.background_mesh(domain, cell_tags, facet_tags), mpm.LinearElastic(young=5e6, poisson=0.3))
     model.seed(density=2e3, per_cell=6, cell_tag=bridge.BODY)
-    force, y = seepage_forces(model, lambda x: -7e3 + 0 * x[:, 0]), model.particles.position[:, 1]
+    force, y = bridge.seepage_forces(model, lambda x: -7e3 + 0 * x[:, 0]), model.particles.position[:, 1]
     assert force.sum(axis=0) == pytest.approx([0.0, 0.0], abs=1e-6)
     assert force[y > 1.5, 1].sum() == pytest.approx(-7e3 * 2.0)
-    assert not seepage_forces(model, lambda x: 7e3 + 0 * x[:, 0]).any()
+    assert not bridge.seepage_forces(model, lambda x: 7e3 + 0 * x[:, 0]).any()
 
 
 # --- factors of safety -----------------------------------------------------------------------------------------------

@@ -1,0 +1,80 @@
+"""Pore pressures prescribed to finite elements, which particles take as pore water or as part of their total stress."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx.mesh import exterior_facet_indices
+from numpy.typing import NDArray
+
+import mpm_core as mpm
+from fenics_bridge import compat
+from fenics_bridge.fem.evaluate import PointSearch
+from fenics_bridge.fem.fields import cell_function
+from fenics_bridge.fem.quasi_static import QuasiStatic
+from fenics_bridge.mesh.names import tag_numbers
+from fenics_bridge.transfer.moved import cell_gradient
+
+EXCESS = "excess_pore_pressure"
+
+
+def skeleton_of(law: Any) -> Any:
+    """The law of the effective stresses: the skeleton of `Undrained`, or the law itself."""
+    return law.skeleton if isinstance(law, mpm.Undrained) else law
+
+
+def takes_pore_pressure(model: mpm.Model, fem: Any) -> bool:
+    """Whether particles take the pore pressures that are prescribed to finite elements. Collective.
+
+    They do as pore water (`Model.add_water`), or where all of them follow `Undrained`, as part of their total stress.
+    """
+    if (
+        not isinstance(fem, QuasiStatic)
+        or fem._water is None
+        or any(isinstance(law, mpm.Undrained) for law in fem.laws)
+    ):
+        return False
+    used = model.comm.allgather(np.unique(model.particles.material).tolist())
+    return model._core.water is not None or all(
+        isinstance(model.laws[material], mpm.Undrained) for materials in used for material in materials
+    )
+
+
+def set_pore_pressure(model: mpm.Model, fem: QuasiStatic, search: PointSearch) -> None:
+    """Give pore water of particles the pressures of the finite elements. Collective."""
+    model.particles.set("pore_pressure", search.values(fem._water)[:, 0])
+    model.particles.set("pressure_gradient", search.values(cell_gradient(fem._water)))
+    model.saturate()
+
+
+def add_to_stress(
+    model: mpm.Model, fem: QuasiStatic, search: PointSearch, smooth: bool, stress: NDArray[Any], state: NDArray[Any]
+) -> None:
+    """Make total stresses of the effective ones of undrained particles, in place, and keep the pressures as their states.
+
+    Collective. The pressure is the mean of the cell, like the stress, unless `smooth`.
+    """
+    water = fem._water if smooth else cell_function(fem.domain, ufl.as_vector([fem._water]), 0, "pore_pressure")
+    pressure = search.values(water)[:, 0]
+    for number, law in enumerate(model.laws):
+        if isinstance(law, mpm.Undrained):
+            rows = model.particles.material == number
+            stress[rows, :3] -= pressure[rows, None]
+            state[rows, law.state_names.index(EXCESS)] = pressure[rows]
+
+
+def stands_on_surface(fem: QuasiStatic) -> bool:
+    """Whether pore pressures act at the boundary where nothing holds the soil, as under free water. Collective."""
+    domain, water = fem.domain, fem._water
+    if water is None:
+        return False
+    at_node = np.zeros(len(domain.geometry.x))
+    at_node[compat.cell_nodes(domain)] = water.x.array[compat.cell_dofs(water.function_space)]
+    facets = exterior_facet_indices(domain.topology)
+    for support in fem.supports:
+        for number in tag_numbers(domain.comm, fem.facet_tags, support.facet_tag, "supports"):
+            facets = np.setdiff1d(facets, fem.facet_tags.find(number))
+    highest = at_node[compat.facet_nodes(domain, facets)].min(axis=1).max(initial=0.0) if len(facets) else 0.0
+    return bool(max(domain.comm.allgather(highest)) > 1e-3 * fem.largest_pore_pressure())
