@@ -178,8 +178,11 @@ def plot_particles(particles: Particles, name: str, axes: Any, area: np.ndarray)
     values, label = _plotted(particles, name)
     position = particles.position
     dim = position.shape[1]
+    slope = 1.0 if dim == 3 or len(position) == 0 else np.divide(*np.ptp(position, axis=0)[::-1])  # height over width
+    wide = slope < 1 / 3
     if axes is None:
-        axes = plt.figure(layout="compressed").add_subplot(projection="3d" if dim == 3 else None)
+        size = (6.4, 4.8) if not wide else (6.4, 6.0 * max(slope, 0.1) + 1.8)
+        axes = plt.figure(figsize=size, layout="compressed").add_subplot(projection="3d" if dim == 3 else None)
     if dim == 3:
         drawn = axes.scatter(*position.T, c=values, s=2)
         axes.set_zlabel("z [m]")
@@ -193,5 +196,6 @@ def plot_particles(particles: Particles, name: str, axes: Any, area: np.ndarray)
         axes.autoscale_view()
         axes.set_aspect("equal")
     axes.set(xlabel="x [m]", ylabel="y [m]")
-    axes.figure.colorbar(drawn, ax=axes, label=label, **({"pad": 0.15, "shrink": 0.7} if dim == 3 else {}))
+    place: dict[str, Any] = {"pad": 0.15, "shrink": 0.7} if dim == 3 else {"location": "bottom", "aspect": 40} if wide else {}
+    axes.figure.colorbar(drawn, ax=axes, label=label, **place)
     return axes
