@@ -76,7 +76,8 @@ def collapse_load(
         load_of: function of a number, the load's value, that returns the load.
         first_step: size of the first step, in the units of the value.
         start: value to begin with.
-        tolerance: width of the last step as a fraction of the value [-].
+        tolerance: fraction of the value below which steps end [-]; `failed_at` is above the result by twice this fraction at most
+            where failure was shown.
         progress: function that is called with each load step, e.g. `print_step`.
 
     Returns:
@@ -114,7 +115,8 @@ def factor_of_safety(
         load: load under which the factor is found.
         start: factor to begin with; the body must carry the load with its strength divided by it (below 1: raised).
         first_step: first increment of the factor.
-        tolerance: width of the last step as a fraction of the factor [-].
+        tolerance: fraction of the factor below which steps end [-]; `failed_at` is above the result by twice this fraction at most
+            where failure was shown.
         progress: function that is called with each load step, e.g. `print_step`.
         unreduced: cell tags whose laws keep their strength.
         reduce: function of law, factor and `unreduced` that returns the law, or laws by cell tag, with less strength.

@@ -79,7 +79,8 @@ def particle_safety(
             have their strength divided by the factor, e.g. by `reduced_strength`; with initial stresses or without.
         start: factor to begin with, at which the soil must rest.
         first_step: first increment of the factor.
-        tolerance: width of the last step as a fraction of the factor [-].
+        tolerance: fraction of the factor below which steps end [-]; `failed_at` is above the result by twice this fraction at most
+            where failure was shown.
         damping: local damping [-], in (0, 1).
         rest: out-of-balance over external force at which the soil counts as at rest [-].
         nmd: average volumetric strains over nodes; without it the factor is that of linear finite elements on the same cells.
