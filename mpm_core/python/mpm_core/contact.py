@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._core import InputError
-from .checks import positive, within
+from .checks import flag, positive, within
 from .collective import collectively
 from .collisions import add_collision
 from .mesh import floats
@@ -249,7 +249,7 @@ def add_contact(
         positive("adhesion", adhesion, "Pa", zero=True)
         within("penalty", penalty, 0, 1)
         positive("penalty", penalty, "(a ratio)")
-        if bonded and (friction or adhesion):
+        if flag("bonded", bonded) and (friction or adhesion):
             raise InputError(
                 f"friction is {friction} and adhesion {adhesion} Pa, expected 0 where bonded is True: nothing slides"
             )

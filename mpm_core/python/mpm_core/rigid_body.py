@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._core import Geometry, InputError
-from .checks import positive, real_numbers
+from .checks import flag, positive, real_numbers
 from .mesh import floats
 from .surfaces import Box, Disc, Sphere, Surface
 
@@ -124,7 +124,7 @@ def _free(body: FreeBody, surface: Surface, centre: NDArray[np.float64], geometr
     dim = len(centre)
     flat = geometry == Geometry.AXISYMMETRIC
     axes = _axes(((False, True) if flat else (True,) * dim) if body.axes is None else body.axes, dim)
-    rotates = (not flat) if body.rotates is None else bool(body.rotates)
+    rotates = (not flat) if body.rotates is None else flag("rotates", body.rotates)
     mass = positive("mass", body.mass, "kg")
     moments = np.zeros(3)
     if rotates:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._core import InputError
-from .checks import positive
+from .checks import flag, positive
 from .mesh import floats
 from .triangles import Triangles
 
@@ -114,12 +114,12 @@ class Polyline:
     def _checked(self, dim: int) -> Any:
         if dim != 2:
             raise InputError("surface is a Polyline, expected a Plane, Sphere or Box in three dimensions")
-        points = floats("points", self.points, (None, 2))
-        least = 3 if self.closed else 2
+        points, closed = floats("points", self.points, (None, 2)), flag("closed", self.closed)
+        least = 3 if closed else 2
         if len(points) < least:
             raise InputError(f"points has {len(points)} points, expected {least} or more")
-        ends = np.roll(points, -1, axis=0) if self.closed else points[1:]
-        starts = points if self.closed else points[:-1]
+        ends = np.roll(points, -1, axis=0) if closed else points[1:]
+        starts = points if closed else points[:-1]
         short = np.flatnonzero((starts == ends).all(axis=1))
         if len(short):
             raise InputError(
@@ -130,7 +130,7 @@ class Polyline:
             raise InputError(
                 f"points makes segments {crossing[0]} and {crossing[1]} cross, expected a line that does not"
             )
-        return _core.Polyline2(points.tolist(), bool(self.closed)), points[0]
+        return _core.Polyline2(points.tolist(), closed), points[0]
 
 
 def _crossing(starts: NDArray, ends: NDArray) -> tuple[int, int] | None:

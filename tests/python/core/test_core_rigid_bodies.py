@@ -276,6 +276,9 @@ DISC = mpm.Disc((1.0, 1.0), 0.5)
         (DISC, {"spin": ([1.0, 0.0], [1.0, 2.0])}, "expected rising"),
         (DISC, {"centre": (1.0, 1.0, 1.0)}, "centre has shape"),
         (DISC, {"adhesion": -1.0}, "adhesion is -1.0 Pa"),
+        (DISC, {"bonded": "no"}, "bonded is 'no', expected True or False"),
+        (DISC, {"body": mpm.FreeBody(mass=1.0, rotates="no")}, "rotates is 'no', expected True or False"),
+        (mpm.Polyline([(0, 0.6), (2, 0.6), (2, 0.9)], closed="no"), {}, "closed is 'no', expected True or False"),
     ],
 )
 def test_wrong_input_is_named(surface, options, message):
