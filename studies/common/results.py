@@ -39,7 +39,7 @@ def open_results(options: Options, comm: MPI.Comm = MPI.COMM_WORLD, *, adds: boo
     Without ``--output`` it is ``results/NAME`` of the repository (of the present folder for an installed package), or where that
     holds a run, ``results/NAME-2`` and so on. A folder named by ``--output`` that holds results is refused, unless
     ``--overwrite`` says that they may be deleted. A run that goes on from a checkpoint writes to the run's folder, where the
-    checkpoint lies, unless ``--output`` names another.
+    checkpoint lies, unless ``--output`` names another, to which its tables over time are copied.
 
     Args:
         options: of the study, as parsed and checked.
@@ -120,6 +120,8 @@ def _opened(options: Options, adds: bool) -> Path:
             raise OutputError(obstacle)
         if goes_on:
             _set_aside(folder)
+        elif home is not None:
+            _bring_histories(home, folder)
         return folder.resolve()
     first = _home() / options.study
     for folder in _numbered(first):
@@ -228,6 +230,12 @@ def _set_aside(folder: Path) -> None:
             path.rename(path.with_name(f"{path.stem}-{number}{path.suffix}"))
     for path in folder.glob("*.part"):
         path.unlink()
+
+
+def _bring_histories(home: Path, folder: Path) -> None:
+    """Copy the tables over time of a run that goes on in another folder: its results are those of the whole run."""
+    for path in home.glob("*.csv"):
+        shutil.copyfile(path, folder / path.name)
 
 
 # --- the mark --------------------------------------------------------------------------------------------------------

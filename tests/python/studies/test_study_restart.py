@@ -270,6 +270,17 @@ def test_a_restart_keeps_options_and_notes_what_changes(tmp_path, checkpointed):
     assert again["parameters"]["damping"] == 0.5 and [r["changed"] for r in again["restarts"]] == [row["changed"], ""]
 
 
+def test_a_restart_in_another_folder_has_the_history_of_the_whole_run(tmp_path, checkpointed):
+    command = [sys.executable, STUDIES / "slope.py", "--restart", checkpointed / "checkpoint.h5", "--output", tmp_path]
+    assert subprocess.run(command, capture_output=True, timeout=60).returncode == 0
+    begin = json.loads((tmp_path / "summary.json").read_text())["restarts"][0]["time_s"]
+    before, whole = (
+        np.genfromtxt(folder / "history.csv", delimiter=",", names=True) for folder in (checkpointed, tmp_path)
+    )
+    kept = before["time_s"] < begin
+    assert kept.any() and np.array_equal(whole[: kept.sum()], before[kept]) and whole["time_s"][-1] > begin
+
+
 def test_a_run_that_is_killed_leaves_its_parameters(tmp_path):
     with sliding(tmp_path) as child:
         child.kill()
