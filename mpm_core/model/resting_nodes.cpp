@@ -293,11 +293,12 @@ void move_resting_nodes(Model<G>& model, const PassOptions& options)
   constexpr int D = G::dim;
   VelocityField<G>& field = model.fields.front();
   RestingCells<D>& resting = field.resting;
-  if (!resting.has_gained)
+  if (options.move && !resting.has_gained)
     gain_resting_momentum<G>(model, options.pic_fraction, field, {});
   for (Index i : resting.nodes)
     gain<D>(1, options.dt * components<D>(field.velocity[i]), resting.displacement[i]);
   resting.has_gained = false;
+  resting.is_behind = true;
 }
 
 #define INSTANTIATE(G)                                                                                                 \

@@ -55,7 +55,8 @@ template <class G>
 void gain_resting_momentum(Model<G>& model, double pic_fraction, VelocityField<G>& field,
                            std::span<Vector<G::dim>> momentum);
 
-/// Moves resting cells with their nodes, whose gains of the step are made now, unless they have been.
+/// Moves resting cells with their nodes, whose gains of the step are made now, unless they have been. With small
+/// displacements, which take place without velocities, nothing is gained.
 template <class G>
 void move_resting_nodes(Model<G>& model, const PassOptions& options);
 } // namespace mpm::model

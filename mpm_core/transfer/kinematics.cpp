@@ -61,6 +61,20 @@ bool move_particles(Particles<D>& particles, Index first, Index last, const Cell
 }
 
 template <int D>
+void count_displacement(Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
+                        const CellMotion<D>& motion)
+{
+  for (Index p = first; p < last; ++p)
+    for (int a = 0; a < D; ++a)
+    {
+      double u = motion.displacement.value[a];
+      for (int b = 0; b < D; ++b)
+        u += motion.displacement.gradient[a][b] * (particles.position[b][p] - shape.centre[b]);
+      particles.initial_position[a][p] -= u;
+    }
+}
+
+template <int D>
 void rotate(const SymmetricColumns<D>& stress, Index first, Index last, const Matrix<D>& rotation)
 {
   const Matrix<D> r = rotation; // a copy that no store can alias
@@ -85,6 +99,7 @@ void strain_particles(Particles<D>& particles, Index first, Index last, const Ce
 
 #define INSTANTIATE(D)                                                                                                 \
   template bool move_particles(Particles<D>&, Index, Index, const CellShape<D>&, const CellMotion<D>&);                \
+  template void count_displacement(Particles<D>&, Index, Index, const CellShape<D>&, const CellMotion<D>&);            \
   template void rotate<D>(const SymmetricColumns<D>&, Index, Index, const Matrix<D>&);                                 \
   template void strain_particles(Particles<D>&, Index, Index, const CellStrain<D>&);
 INSTANTIATE(2)

@@ -14,6 +14,11 @@ template <int D>
 bool move_particles(Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
                     const CellMotion<D>& motion);
 
+/// Counts the displacement of the particles [first, last) of a cell, which stay where they are: sum N_i displacement_i.
+template <int D>
+void count_displacement(Particles<D>& particles, Index first, Index last, const CellShape<D>& shape,
+                        const CellMotion<D>& motion);
+
 /// Columns of a symmetric tensor in the order of `symmetric_pairs`: the stress without zz in plane strain.
 template <int D>
 using SymmetricColumns = std::array<double*, n_symmetric<D>>;

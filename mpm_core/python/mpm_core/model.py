@@ -307,9 +307,10 @@ class Model(ContactMethods, Body):
             nmd: average volumetric strains over nodes (nodal mixed discretisation).
             integration: how stresses become forces: PARTICLES or MIXED; by default as in ``explicit``.
             ghost: ghost penalty, against nodes that carry hardly any mass; ``GhostPenalty()`` by default.
-            small_displacements: change the particles' stresses but not their positions and volumes, for quasi-static runs. With
-                ``nmd``, strains and nodal forces are averaged as in the finite elements, so that the tangent is symmetric for
-                associated flow. Pressures of nearly incompressible soil may then alternate from cell to cell.
+            small_displacements: change the particles' stresses but not their positions and volumes, for quasi-static runs;
+                ``particles.displacement`` counts the displacements all the same. With ``nmd``, strains and nodal forces are
+                averaged as in the finite elements, so that the tangent is symmetric for associated flow. Pressures of nearly
+                incompressible soil may then alternate from cell to cell.
             rebalance: see ``explicit``; checked before each step.
             energy_limit: see ``explicit``; by default none. What the scheme dissipates counts as unexplained.
             second_order: use a method of second order in time with two stages per step (Alexander 1977) instead of backward

@@ -70,7 +70,10 @@ class Particles:
 
     @property
     def displacement(self) -> NDArray[np.float64]:
-        """Position minus initial position [m], shape (n, D)."""
+        """Position minus initial position [m], shape (n, D).
+
+        Steps of small displacements, which leave the position as it is, change the initial position instead.
+        """
         return self.position - self.initial_position
 
     @property

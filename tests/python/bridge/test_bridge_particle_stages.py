@@ -47,6 +47,37 @@ def test_particles_that_keep_their_places_have_the_stresses_of_the_finite_elemen
     assert laws is elastic or p.plastic_strain.max() > 1e-5
 
 
+@pytest.mark.parametrize("geometry", [None, bridge.Geometry.AXISYMMETRIC])
+def test_particles_that_keep_their_places_count_the_displacement_of_the_finite_elements(tmp_path, geometry):
+    """With the same cells both are the same equations: displacements are linear in each triangle, also from a reset on."""
+    mesh, soils = mesh_of("pit", tmp_path), SOILS["pit"]
+    dig = bridge.Stage("dig", excavate="pit 1", reset_displacement=True)
+    fem = site_of(mesh, plastic(soils), degree=1, first_step=1.0, geometry=geometry)
+    site = particle_site(mesh, plastic(soils), geometry=geometry, small_displacements=True, tolerance=1e-8)
+    for stage in [IN_SITU, dig, bridge.Stage("deeper", excavate="pit 2")]:
+        fem.carry_out(stage)
+        report, p = site.carry_out(stage), site.model.particles
+        expected = fem.fem.evaluate_at(p.position)["displacement"]
+        largest = np.linalg.norm(expected, axis=1).max()
+        assert np.allclose(p.displacement, expected, rtol=0, atol=1e-7 * largest)
+        assert report.largest_displacement == pytest.approx(largest, rel=1e-6)
+
+
+def test_tetrahedra_are_filled_by_default():
+    """A layer on rollers settles by gamma (H z - z^2 / 2) / M in each of its points, up to linear elements."""
+    domain, cells, facets = bridge.box_mesh(MPI.COMM_WORLD, [1.0, 1.0, 4.0], [1, 1, 16])
+    normals = {1: (1, 0, 0), 2: (1, 0, 0), 3: (0, 1, 0), 4: (0, 1, 0), 5: (0, 0, 1)}
+    soil, supports = elastic(["ground"])["ground"], [bridge.roller(tag, normal) for tag, normal in normals.items()]
+    site = bridge.ParticleSite(
+        mpm.Model(bridge.background_mesh(domain, cells, facets), soil), {1: 0}, supports, small_displacements=True
+    )
+    site.carry_out(bridge.Stage("in situ", fill=1, unit_weight={1: 20e3}))
+    p = site.model.particles
+    z = p.position[:, 2]
+    expected = -20e3 * (4 * z - z**2 / 2) / oedometer("ground")
+    assert np.allclose(p.displacement[:, 2], expected, rtol=0, atol=2e-3 * np.abs(expected).max())
+
+
 def test_layers_settle_as_by_hand(tmp_path):
     """Stiff enough that the particles' own motion changes nothing: 1 % of the sum of one-dimensional compressions."""
     mesh, soils = mesh_of("column", tmp_path), SOILS["column"]
