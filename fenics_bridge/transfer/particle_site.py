@@ -26,7 +26,7 @@ class ParticleSite:
         materials: number of its law in the model by soil (name or number of its tag).
         supports: boundary conditions as for `QuasiStatic`, without prescribed displacements.
         gravity: acceleration of gravity [m/s2], by which unit weights become densities.
-        per_cell: particles per cell, as for `Model.seed`.
+        per_cell: particles per cell, as for `Model.seed`; by default 3 in a triangle and 4 in a tetrahedron.
         small_displacements: keep the particles at their places, as the finite elements do; otherwise they move.
         **options: options of `Model.equilibrate` for each stage: solver, nmd, ghost, tolerance, max_steps.
 
@@ -42,7 +42,7 @@ class ParticleSite:
         supports: Sequence[Support],
         *,
         gravity: float = 9.81,
-        per_cell: int = 3,
+        per_cell: int | None = None,
         small_displacements: bool = False,
         **options: Any,
     ) -> None:
@@ -52,7 +52,7 @@ class ParticleSite:
         """The particles"""
         self.number = 0
         """Number of the last stage, from 1 on; 0 before the first one"""
-        self._per_cell, self._g = per_cell, gravity
+        self._per_cell, self._g = mesh.dim + 1 if per_cell is None else per_cell, gravity
         self._options: dict[str, Any] = {"small_displacements": small_displacements, **options}
         names = {tags[0]: repr(name) for name, tags in mesh.names["cell"].items() if len(tags) == 1}
         self.state = SiteState(
