@@ -169,9 +169,13 @@ def _state(
     None stands for the ranks where each rank owns the cells that the particles of the same rank of the file are in.
     """
     comm, none = model.comm, np.empty(0, np.int64)
+    # Fields that the model has declared, as for contact with friction, and the run had not: they keep their initial value.
+    new = {field["name"] for field in _added_fields(model)} - {field["name"] for field in there["added_fields"]}
     columns = {
         field["name"]: Column(
-            field["components"], model._core.column(field["name"], none).dtype.kind == "i", field["optional"]
+            field["components"],
+            model._core.column(field["name"], none).dtype.kind == "i",
+            field["optional"] or field["name"] in new,
         )
         for field in model.particles.schedule()
     }

@@ -36,13 +36,24 @@ class RigidContact:
         self._number = number
         self._outline: Outline | None = None  # at the start
 
+    @property
+    def _index(self) -> int:
+        """Its place among the contacts of the model, which `Model.restore` replaces."""
+        there = len(self.model._contacts)
+        if self._number >= there:
+            raise InputError(
+                f"rigid surface {self._number} is not in the model, which has {there} since it was restored; expected one of "
+                "model.contacts"
+            )
+        return self._number
+
     def __repr__(self) -> str:
-        entry = self.model._contacts[self._number]
+        entry = self.model._contacts[self._index]
         how = "tied" if entry["bonded"] else f"friction {entry['friction']:g}, adhesion {entry['adhesion']:g} Pa"
         return f"<RigidContact {self._number}: {surface_of(self.model, entry['surface'])!r}, {how}>"
 
     def _state(self) -> dict[str, Any]:
-        return _core.contact_state(self.model._core, self._number)  # type: ignore[no-any-return]
+        return _core.contact_state(self.model._core, self._index)  # type: ignore[no-any-return]
 
     def _vector(self, name: str) -> NDArray[np.float64]:
         return np.array(self._state()[name])
@@ -129,15 +140,16 @@ class RigidContact:
             Points [m], shape (n, D), and the numbers of the points of each segment or triangle, shape (m, D).
         """
         if self._outline is None:
-            entry = self.model._contacts[self._number]
-            self._outline = outline(surface_of(self.model, entry["surface"]), *mesh_box(self.model))
+            self._outline = outline(
+                surface_of(self.model, self.model._contacts[self._index]["surface"]), *mesh_box(self.model)
+            )
         points, cells = self._outline
         return self._centre + (points - self._start) @ self.rotation.T, cells
 
     @property
     def _start(self) -> NDArray[np.float64]:
         """The centre at the start [m]."""
-        return np.array(self.model._contacts[self._number]["body"]["centre"])
+        return np.array(self.model._contacts[self._index]["body"]["centre"])
 
     @property
     def _centre(self) -> NDArray[np.float64]:

@@ -31,15 +31,26 @@ class FieldContact:
         self.model = model
         self._number = number
 
+    @property
+    def _index(self) -> int:
+        """Its place among the contacts of the model, which `Model.restore` replaces."""
+        there = len(self.model._field_contacts)
+        if self._number >= there:
+            raise InputError(
+                f"field contact {self._number} is not in the model, which has {there} since it was restored; expected one of "
+                "model.field_contacts"
+            )
+        return self._number
+
     def __repr__(self) -> str:
-        entry = self.model._field_contacts[self._number]
+        entry = self.model._field_contacts[self._index]
         return (
             f"<FieldContact {self._number}: of velocity fields {entry['first']} and {entry['second']}, friction "
             f"{entry['friction']:g}, adhesion {entry['adhesion']:g} Pa>"
         )
 
     def _state(self) -> dict[str, Any]:
-        return _core.field_contact_state(self.model._core, self._number)  # type: ignore[no-any-return]
+        return _core.field_contact_state(self.model._core, self._index)  # type: ignore[no-any-return]
 
     @property
     def force(self) -> NDArray[np.float64]:
@@ -66,7 +77,7 @@ class FieldContact:
             Their positions [m], the unit normals from the first body to the second [-], and the forces of the first body on the
             second [N], all of shape (n, D).
         """
-        return _core.touching_nodes(self.model._core, self._number)  # type: ignore[no-any-return]
+        return _core.touching_nodes(self.model._core, self._index)  # type: ignore[no-any-return]
 
     def values(self) -> dict[str, float]:
         """Numbers by name of column, as a probe gives them: time, force, impulse and number of nodes in contact."""

@@ -265,6 +265,14 @@ def test_a_run_goes_on_from_a_checkpoint_to_the_last_bit(tmp_path):
     for one, other in zip(whole.contacts, resumed.contacts, strict=True):
         for name in ("force", "impulse", "moment", "displacement"):
             assert np.array_equal(getattr(one, name), getattr(other, name)), name
+    other = whole.contacts[1]
+    prepared()[0].save(tmp_path / "before.h5")
+    whole.restore(tmp_path / "before.h5")
+    for use in (repr, lambda contact: contact.force, lambda contact: contact.outline()):
+        with pytest.raises(
+            mpm.InputError, match="rigid surface 1 is not in the model, which has 0 since it was restored"
+        ):
+            use(other)
 
 
 @pytest.mark.parametrize(

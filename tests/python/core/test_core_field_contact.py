@@ -134,6 +134,13 @@ def test_a_restart_goes_on_to_the_last_bit(tmp_path):
     np.testing.assert_array_equal(model.particles.velocity, same.particles.velocity)
     np.testing.assert_array_equal(contact.impulse, same.field_contacts[0].impulse)
     assert report.friction_work == model.report().friction_work > 0
+    block_on_layer(30.0, 0.3, mesh=ALIGNED, contact=False)[0].save(tmp_path / "before.h5")
+    model.restore(tmp_path / "before.h5")
+    for use in (repr, lambda contact: contact.force, lambda contact: contact.touching()):
+        with pytest.raises(
+            mpm.InputError, match="field contact 0 is not in the model, which has 0 since it was restored"
+        ):
+            use(contact)
 
 
 def test_bodies_on_a_curved_interface():
