@@ -120,6 +120,23 @@ class Site:
         model.set_gravity([0.0] * (mesh.dim - 1) + [-GRAVITY])
         return model
 
+    def left_out_at_once(self) -> str:
+        """A warning of what stages change beside placing soils, for a study that has all soils at once; else no text."""
+        found = []
+        for stage in self.stages:
+            weights = [
+                weight for soil, weight in stage.unit_weight.items() if weight != self.unit_weight.get(str(soil))
+            ]
+            changes = {"excavate": stage.excavate, "law": stage.law, "unit_weight": weights, "pressure": stage.pressure,
+                       "support": stage.support, "release": stage.release, "water_level": stage.pore_pressure}  # fmt: skip
+            found += [f"{key} of {stage.name!r}" for key, change in changes.items() if change]
+        if not found:
+            return ""
+        return (
+            f"all soils are there at once, and what the stages of the site change is left out: {', '.join(found)}; in a script "
+            "bridge.carry_out and then bridge.factor_of_safety take it into account (docs/howto/stages.md)"
+        )
+
     def tags_of(self, soils: Sequence[str]) -> list[int]:
         """Cell tags of soils, whose laws they number.
 

@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 
-from .checks import check_effect
+from .checks import check_effect, say
 from .collapse_runs import UNDECIDED
 from .field_plots import bend, mechanism_field, save_convergence, save_curves, save_mechanism
 from .figures import Pictures
@@ -66,6 +66,7 @@ def site_study(
         progress = step_line(f"{cells}, {label[0].lower()}{label[1:]}")
         model = site.finite_elements(**finite_elements(a))
         runs.append(find(site, model, progress))
+    say(site.left_out_at_once())
     rows = [{"cell_size_m": size, name: run.value, "failed_at": run.failed_at, "failure_shown": run.failed,
              "reason": run.reason, "largest_missing_stress_fraction": run.missing, "largest_displacement_m": run.curve[-1, 1]}
             for size, run in zip(sizes, runs)]  # fmt: skip
@@ -75,7 +76,8 @@ def site_study(
     said = []
     for row in rows:
         sure = "" if row["failure_shown"] else f", a lower bound only: {row['reason']}"
-        said.append(f"cells of {row['cell_size_m'] or np.nan:g} m: {name.replace('_', ' ')} {row[name]:.3f}{sure}")
+        cells = "mesh of the site" if row["cell_size_m"] is None else f"cells of {row['cell_size_m']:g} m"
+        said.append(f"{cells}: {name.replace('_', ' ')} {row[name]:.3f}{sure}")
     drawn = _drawn(folder, sizes, runs, label, site.axisymmetric, model.cell_tags)
     write_summary(folder, a, summary, comm, pictures=drawn, said="\n".join(said))
     return 0 if all(run.failed for run in runs) else UNDECIDED
@@ -91,7 +93,8 @@ def _drawn(
     names = ["site" if size is None else f"{size:g} m" for size in sizes]
     curves = {name: (1e3 * run.curve[:, 1], run.curve[:, 0]) for name, run in zip(names, runs)}
     wide, lowest = 1e3 * bend([run.curve for run in runs]), 0.98 * min(run.curve[0, 0] for run in runs)
-    values, title = {"site": [run.value for run in runs]}, f"{label.split(' [')[0]} {runs[-1].value:.3f}"
+    values, least = {"site": [run.value for run in runs]}, "" if runs[-1].failed else "of at least "
+    title = f"{label.split(' [')[0]} {least}{runs[-1].value:.3f}"
     pictures: Pictures = {
         "mechanism": lambda: save_mechanism(folder / "mechanism.png", field, title),
         "value_displacement": lambda: save_curves(

@@ -19,6 +19,7 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 from .animation import save_animation
+from .checks import say
 from .figures import Pictures
 from .history import History
 from .interrupt import Interrupt
@@ -167,6 +168,7 @@ def site_slide(a: Namespace) -> int:
     start = perf_counter()
     folder = open_results(a, comm)
     site = read_site(a.site, comm)
+    say(site.left_out_at_once())
     nmd = averages(a, site.laws.values())
     fem = site.finite_elements(1, nmd=nmd, solver=bridge.Solver(tolerance=1e-10), as_particles=nmd)
     steps = fem.solve(site.load())

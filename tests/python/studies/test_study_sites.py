@@ -134,6 +134,35 @@ def test_without_friction_more_weight_is_as_less_strength(tmp_path):
     assert high - low <= 4e-3 * low
 
 
+STAGES = """
+[[stages]]
+name = "in situ"
+fill = ["lower", "upper"]
+water_level = 1.0
+[[stages]]
+name = "cut"
+excavate = "upper"
+unit_weight = {lower = 11e3}
+release = "left"
+"""
+
+
+def test_stages_that_are_left_out_are_named(tmp_path):
+    options = [
+        "--site",
+        site_in(tmp_path, SITE + STAGES),
+        "--meshes",
+        1,
+        "--output",
+        tmp_path / "safety",
+    ]
+    said = "left out: water_level of 'in situ', excavate of 'cut', unit_weight of 'cut', release of 'cut'; in a script"
+    with pytest.warns(RuntimeWarning, match=said):
+        importlib.import_module("safety").main([str(word) for word in options])
+    placed = SITE + STAGES.partition("water_level")[0]
+    assert site_file.read_site(site_in(tmp_path, placed), MPI.COMM_SELF).left_out_at_once() == ""
+
+
 def test_a_soil_of_a_site_may_keep_its_strength(tmp_path):
     """More strength never lowers the factor of soils that flow without a change of volume, by limit analysis."""
     path, factors = site_in(tmp_path, SITE.replace("cell_size = 0.5", "cell_size = 1.0")), {}
