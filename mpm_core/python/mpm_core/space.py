@@ -123,6 +123,8 @@ class SpaceWatch:
         self._model = model
         self._parts = count_parts(model)
         self._steps = model.steps
+        at_start = space(model)
+        self._uneven = at_start.filled < LEAST_FILLED * at_start.particles
 
     def look(self) -> None:
         """Warn if the body has come apart, or takes up too little space. Collective."""
@@ -142,10 +144,16 @@ class SpaceWatch:
                 stacklevel=5,
             )
         if volumes.filled < LEAST_FILLED * volumes.particles:
+            cause = (
+                "they did so at the start, as on a regular grid of points, some of which lie on the sides of cells, or where soil "
+                "was placed twice; Model.seed fills cells evenly"
+                if self._uneven
+                else "they accumulate in some cells, so that the body takes up too little space; this is less with "
+                "integration=MIXED than with PARTICLES"
+            )
             warnings.warn(
                 f"the particles fill {100 * volumes.filled / volumes.particles:.0f} % of their volume at t = "
-                f"{self._model.time:.6g} s: they accumulate in some cells, so that the body takes up too little space; this is less "
-                "with integration=MIXED than with PARTICLES",
+                f"{self._model.time:.6g} s: {cause}",
                 RuntimeWarning,
                 stacklevel=5,
             )
