@@ -83,7 +83,9 @@ def particle_safety(
             where failure was shown.
         damping: local damping [-], in (0, 1).
         rest: out-of-balance over external force at which the soil counts as at rest [-].
-        nmd: average volumetric strains over nodes; without it the factor is that of linear finite elements on the same cells.
+        nmd: average volumetric strains over nodes; without it the factor is that of linear finite elements on the same cells. In soil
+            that dilates less than by its friction angle strains are averaged in part, and factors on coarse cells are higher than
+            those of finite elements with `nmd` (docs/fem.md).
         progress: function that is called with each step of the factor, e.g. `print_step`.
 
     Returns:

@@ -243,7 +243,7 @@ class SectionProbe:
         self._gradient[cells] = np.linalg.solve(edges, rising)[..., 0]
 
     def values(self) -> dict[str, float]:
-        """The force by components, and along the normal; in N, in two dimensions per metre of thickness."""
+        """The force by components, and along the normal; in N, in two dimensions per metre of thickness or per radian."""
         model, dim = self.model, self.model.mesh.dim
         if self._mesh is not model.mesh or model._core.has_moved_cells:
             self._cut(model.mesh)
