@@ -8,7 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
 
-import numpy as np
 from mpi4py import MPI
 
 import fenics_bridge as bridge
