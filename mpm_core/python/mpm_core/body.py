@@ -90,7 +90,7 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
         self._field_contacts: list[dict[str, Any]] = []
         self._triangulated: dict[str, Triangles] = {}  # their triangles by fingerprint, which checkpoints do not have
         self._next_id = 0
-        self._seeded_late = False  # after a rigid surface was added
+        self._late: int | None = None  # first number of the particles that were placed after a rigid surface was added
         self._control: Any = None  # of the implicit run, a StepControl
         self._resumed: Any = None  # of a checkpoint, for the next implicit run
         self.repartitions = 0
@@ -122,8 +122,9 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
     # --- particles -----------------------------------------------------------------------------------------------
 
     def _seeded(self, added: int, ids: int) -> int:
+        if self._contacts and self._late is None:
+            self._late = self._next_id
         self._next_id += ids
-        self._seeded_late = self._seeded_late or bool(self._contacts)
         self._integration = None
         return self.comm.allreduce(added)
 

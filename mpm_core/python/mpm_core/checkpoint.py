@@ -410,7 +410,7 @@ def _take(model: Model, there: dict[str, Any]) -> None:
     core.outflow_tags = there["outflow_tags"]
     model._conditions = [(tag, whole, vector) for tag, whole, vector in there["supports"]]
     model._prescribed = {int(tag): model._conditions[k] for tag, k in there["prescribed"].items()}
-    model._next_id = there["next_id"]
+    model._next_id, model._late = there["next_id"], None
     model._left_imbalance = there["left_imbalance"]
     model._integration = _core.Integration.__members__.get(there["integration"])
     core.last_integration = _core.Integration.__members__[there.get("last_integration") or "PARTICLES"]

@@ -156,6 +156,10 @@ class RigidContact:
         """The centre now [m]."""
         return self._start + self.displacement
 
+    def _at_start(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where points of the body were at its start [m], shape (n, D)."""
+        return self._start + (points - self._centre) @ self.rotation
+
     def velocity_at(self, points: ArrayLike) -> NDArray[np.float64]:
         """Velocity of points of the body in the last step [m/s], shape (n, D).
 
@@ -289,24 +293,38 @@ def add_contact(
     return RigidContact(model, len(model._contacts) - 1)
 
 
-def require_outside(model: Model, surface: Surface, depth: float = 0.0) -> None:
-    """Raise an InputError where soil is deeper than this inside of a surface [m]. Collective."""
+def require_outside(model: Model, surface: Surface) -> None:
+    """Raise an InputError where soil is inside of a surface. Collective."""
     gap = smallest_gap(model, surface)
-    if gap < -depth - ROUND_OFF * np.abs(mesh_box(model)).max():
-        raise InputError(
-            f"surface {surface!r} overlaps the soil by {-gap:.6g} m, expected it outside of all particles, which have the radius "
-            "V^(1/D)/2; see Model.gap, and for planes and polylines the side on which the soil is"
-        )
+    if gap < -ROUND_OFF * np.abs(mesh_box(model)).max():
+        raise InputError(_overlap(repr(surface), -gap))
+
+
+def _overlap(surface: str, depth: float) -> str:
+    """Text of the error of soil inside of a surface."""
+    return (
+        f"surface {surface} overlaps the soil by {depth:.6g} m, expected it outside of all particles, which have the radius "
+        "V^(1/D)/2; see Model.gap, and for planes and polylines the side on which the soil is"
+    )
 
 
 def require_new_soil_outside(model: Model) -> None:
-    """Raise an InputError where soil was placed inside of a surface after that was added, before the first step. Collective."""
-    if model.steps > 0 or not model._seeded_late:
+    """Raise an InputError where soil was placed inside of a surface since that was added, before a run with it. Collective."""
+    if model._late is None:
         return
-    radius = 0.5 * model.comm.allreduce(float(model.particles._sides().max(initial=0.0)), MPI.MAX)
-    for entry in model._contacts:
-        if not entry["bonded"]:
-            require_outside(model, surface_of(model, entry["surface"]), DEEPEST * radius)
+    p, comm = model.particles, model.comm
+    radius = 0.5 * p._sides()
+    largest = comm.allreduce(float(radius.max(initial=0.0)), MPI.MAX)
+    new = (p.id >= model._late) & ~p.is_resting
+    for contact, entry in zip(model.contacts, model._contacts, strict=True):
+        if entry["bonded"]:
+            continue
+        surface = surface_of(model, entry["surface"])
+        gap = distances(surface, contact._at_start(p.position[new])) - radius[new]
+        if (depth := -comm.allreduce(float(gap.min(initial=np.inf)), MPI.MIN)) > DEEPEST * largest:
+            moved = f", which has moved by {contact.displacement} m," if model.steps else ""
+            raise InputError(_overlap(f"{surface!r}{moved}", depth))
+    model._late = None
 
 
 BOND_REACH = 1.5

@@ -350,3 +350,22 @@ def test_soil_that_is_placed_inside_of_a_surface_later_is_refused_when_the_run_b
         with pytest.raises(mpm.InputError, match=r"overlaps the soil by 0\.055 m"):
             run()
     assert model.steps == 0
+
+
+def test_soil_that_is_placed_inside_of_a_surface_that_has_moved_is_refused(tmp_path):
+    """A box turns by a quarter about its corner, from the right of it to above it, in the first run."""
+    model = mpm.Model(box((12, 8), (1.2, 0.8)), mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed_points([(0.1, 0.1)], [1e-4], density=1000.0)
+    model.set_gravity((0.0, -1e-6))
+    turned = model.add_contact(mpm.Box((0.6, 0.3), (1.0, 0.4)), spin=np.pi / 2, centre=(0.6, 0.3))
+    list(model.explicit(1.0, dt=1e-3))
+    assert turned.rotation == pytest.approx(np.array([(0.0, -1.0), (1.0, 0.0)]), abs=1e-12)
+    model.seed_points([(0.8, 0.35)], [1e-4], density=1000.0)  # where it was
+    list(model.explicit(1.001, dt=1e-3))
+    model.seed_points([(0.55, 0.5)], [1e-4], density=1000.0)  # in the middle of where it is, 0.1 m wide
+    for run in (lambda: model.explicit(1.1), lambda: model.implicit(1.1, dt=0.01)):
+        with pytest.raises(mpm.InputError, match=r"which has moved by .* overlaps the soil by 0\.05[45]"):
+            run()
+    model.save(tmp_path / "state.h5")
+    model.restore(tmp_path / "state.h5")  # what a run has there may be deeper
+    list(model.explicit(1.002, dt=1e-4))
