@@ -53,6 +53,8 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
+HIGHEST = 1 / (4 * STEP)
+"""Highest frequency in spectra of the history, whose steps are twice those of the motion [Hz]"""
 COLUMNS = [
     "time_s", "crest_velocity_m_per_s", "crest_level_velocity_m_per_s", "toe_level_velocity_m_per_s",
     "foot_velocity_m_per_s", "slope_displacement_m", "free_field_displacement_m",
@@ -146,6 +148,14 @@ def check_motion(p: ArgumentParser, a: Namespace) -> None:
     check(p, a.motion != "noise" or band[0] < band[1],
           lambda: f"--highest-frequency is {band[1]:g} Hz, expected above the lowest frequency of the noise (half of "
                   f"--frequency, {band[0]:g} Hz)")  # fmt: skip
+    name, most = ("--highest-frequency", HIGHEST) if a.motion == "noise" else ("--frequency", HIGHEST / 2)
+    value = a.highest_frequency if a.motion == "noise" else a.frequency
+    check(p, value <= most,
+          lambda: f"{name} is {value:g} Hz, expected at most {most:g} Hz: steps of {2 * STEP:g} s have spectra up to {HIGHEST:g} Hz"
+                  + ", and a Ricker wavelet has energy up to twice its frequency" * (a.motion == "ricker"))  # fmt: skip
+    check(p, a.motion != "ricker" or a.duration >= 3 / a.frequency,
+          lambda: f"--duration is {a.duration:g} s, expected at least {3 / a.frequency:g} s, three periods of --frequency, which a "
+                  "Ricker wavelet takes")  # fmt: skip
     check(p, a.motion != "noise" or not synthetic or noise_band(band, a.duration, STEP)[1].any(),
           lambda: f"--duration is {a.duration:g} s, in which noise of steps of {STEP:g} s has no frequency from {band[0]:g} to "
                   f"{band[1]:g} Hz; expected a longer one, or other values of --frequency and --highest-frequency")  # fmt: skip

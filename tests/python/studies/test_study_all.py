@@ -23,7 +23,7 @@ SMALL = {
     "--displacement 1e-6",
     "drawdown": "--cell-size 3 --elements P1 --days 1 --factor-times 1",
     "earthquake": "--cell-size 2.5 --level 10 --soil-depth 5 --stiff-depth 5 --particles-per-cell 1 --motion ricker "
-    "--peak 1 --duration 1 --rest 0 --frames 2",
+    "--peak 1 --frequency 3 --duration 1 --rest 0 --frames 2",
     "element_test": "--steps 5",
     "embankment": "--cell-size 2 --particles-per-cell 1 --time 0.05 --frames 2",
     "excavation": "--cell-size 3 --elements P1",

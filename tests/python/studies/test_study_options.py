@@ -36,6 +36,9 @@ REFUSED = [
     # the motion of an earthquake
     ("earthquake", "--highest-frequency 0.1",
      "--highest-frequency is 0.1 Hz, expected above the lowest frequency of the noise (half of --frequency, 1 Hz)"),
+    ("earthquake", "--highest-frequency 26", "--highest-frequency is 26 Hz, expected at most 25 Hz: steps of 0.02 s have"),
+    ("earthquake", "--motion ricker --frequency 13", "expected at most 12.5 Hz: steps of 0.02 s have spectra up to 25 Hz, and a"),
+    ("earthquake", "--motion ricker --duration 1.4", "--duration is 1.4 s, expected at least 1.5 s, three periods of --fr"),
     ("earthquake", "--highest-frequency 1.001 --duration 1", "has no frequency from 1 to 1.001 Hz"),
     ("earthquake", "--accelerogram no.txt", "--accelerogram is no.txt, but there is no such file"),
     # options without effect
