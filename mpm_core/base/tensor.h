@@ -104,4 +104,27 @@ inline double norm(const Vector<D>& a)
 {
   return std::sqrt(dot<D>(a, a));
 }
+
+/// The rotation of a spin over a step, its Cayley transform (Hughes & Winget 1980): orthogonal however large the spin.
+/// @param half_spin  half of the step's rotation, antisymmetric
+template <int D, class T>
+inline std::array<std::array<T, D>, D> cayley_rotation(const std::array<std::array<T, D>, D>& half_spin)
+{
+  T half_angle_squared{};
+  for (int i = 0; i < D; ++i)
+    for (int j = 0; j < i; ++j)
+      half_angle_squared += half_spin[i][j] * half_spin[i][j];
+  // (1 - W)^-1 (1 + W) = 1 + 2 (W + W W) / (1 + |w|^2) for the antisymmetric W of axial vector w
+  const T scale = 2 / (1 + half_angle_squared);
+  std::array<std::array<T, D>, D> rotation;
+  for (int i = 0; i < D; ++i)
+    for (int j = 0; j < D; ++j)
+    {
+      T square{};
+      for (int k = 0; k < D; ++k)
+        square += half_spin[i][k] * half_spin[k][j];
+      rotation[i][j] = (i == j ? 1.0 : 0.0) + scale * (half_spin[i][j] + square);
+    }
+  return rotation;
+}
 } // namespace mpm::base

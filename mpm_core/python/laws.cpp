@@ -197,9 +197,9 @@ void bind_umat(py::module_& m)
   bind_law<Umat>(
       m, "Umat", "A law given as an Abaqus UMAT in a shared library.",
       R"(NDI is 3, NSHR 1 in plane strain and 3 in three dimensions. TIME, DTIME, CELENT, DFGRD0 and DFGRD1 have the
-values of the point; DTIME is one where loading is infinitely slow, CELENT is one where there is no cell. DROT is the
-identity, because the stress has already been rotated with the material. Temperature is not supported. PNEWDT below
-one counts as a failure.)",
+values of the point; DTIME is one where loading is infinitely slow, CELENT is one where there is no cell. STRESS and
+STRAN have been rotated with the material; DROT is this rotation, by which the UMAT rotates tensors in STATEV. Temperature is
+not supported. PNEWDT below one counts as a failure.)",
       &loaded_umat)
       .def_readonly("properties", &Umat::properties, "PROPS")
       .def_readonly("n_variables", &Umat::n_variables, "NSTATV")

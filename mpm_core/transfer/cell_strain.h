@@ -29,22 +29,19 @@ inline T deviatoric_size(const std::array<T, n_stress<D>>& e, const T& volumetri
   return root(2.0 / 3.0 * (normal + 0.5 * shear));
 }
 
-/// From the gradient of velocity over a step. The rotation is the Cayley transform of the spin (Hughes & Winget 1980),
-/// so that stresses turn without a change of size however large the step.
+/// From the gradient of velocity over a step. Stresses turn by the Cayley transform of the spin without a change of
+/// size.
 template <int D, class T>
 inline CellStrain<D, T> strain_increment(const std::array<std::array<T, D>, D>& velocity_gradient, double dt)
 {
   CellStrain<D, T> strain{};
-  std::array<std::array<T, D>, D> spin;
-  T half_angle_squared{};
+  std::array<std::array<T, D>, D> half_spin;
   for (int i = 0; i < D; ++i)
   {
     strain.increment[i] = dt * velocity_gradient[i][i];
     strain.volumetric += strain.increment[i];
     for (int j = 0; j < D; ++j)
-      spin[i][j] = 0.25 * dt * (velocity_gradient[i][j] - velocity_gradient[j][i]); // half of the step's rotation
-    for (int j = 0; j < i; ++j)
-      half_angle_squared += spin[i][j] * spin[i][j];
+      half_spin[i][j] = 0.25 * dt * (velocity_gradient[i][j] - velocity_gradient[j][i]);
   }
   for (int k = D; k < n_symmetric<D>; ++k)
   {
@@ -52,17 +49,7 @@ inline CellStrain<D, T> strain_increment(const std::array<std::array<T, D>, D>& 
     strain.increment[stress_component<D>[k]] = dt * (velocity_gradient[i][j] + velocity_gradient[j][i]);
   }
   strain.deviatoric = deviatoric_size<D>(strain.increment, strain.volumetric);
-
-  // (1 - W)^-1 (1 + W) = 1 + 2 (W + W W) / (1 + |w|^2) for the antisymmetric W of axial vector w
-  const T scale = 2 / (1 + half_angle_squared);
-  for (int i = 0; i < D; ++i)
-    for (int j = 0; j < D; ++j)
-    {
-      T square{};
-      for (int k = 0; k < D; ++k)
-        square += spin[i][k] * spin[k][j];
-      strain.rotation[i][j] = (i == j ? 1.0 : 0.0) + scale * (spin[i][j] + square);
-    }
+  strain.rotation = cayley_rotation<D>(half_spin);
   return strain;
 }
 

@@ -1,5 +1,6 @@
 #include "materials/laws/umat.h"
 
+#include "base/tensor.h"
 #include "materials/tools/elasticity.h"
 #include "materials/tools/require.h"
 
@@ -20,7 +21,7 @@ struct Arguments
 {
   static constexpr std::size_t n = n_stress<D>;
   std::array<double, n> stress, strain, increment;
-  std::array<double, 9> gradient_before, gradient; ///< row by row
+  std::array<double, 9> gradient_before, gradient, rotation; ///< row by row
   double time, duration, length;
   std::array<double, n * n> ddsdde{};
   std::array<double, max_states> variables{};
@@ -64,6 +65,38 @@ std::array<double, 9> transposed(const std::array<double, 9>& a)
   return {a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8]};
 }
 
+/// Rotation of the material in an increment, by which stresses have been turned already
+std::array<double, 9> rotation_of(const std::array<double, 9>& f)
+{
+  Matrix<3> half_spin;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j)
+      half_spin[i][j] = 0.25 * (f[3 * i + j] - f[3 * j + i]);
+  const Matrix<3> rotation = cayley_rotation<3>(half_spin);
+  std::array<double, 9> rows;
+  for (std::size_t k = 0; k < 9; ++k)
+    rows[k] = rotation[k / 3][k % 3];
+  return rows;
+}
+
+/// Turns the strain of STRAN with the material.
+template <int D>
+void turn_strain(const std::array<double, 9>& rotation, std::array<double, n_stress<D>>& strain)
+{
+  std::array<double, 9> tensor{};
+  const auto entries = [](std::size_t k) // of a component, in Abaqus's order
+  {
+    constexpr std::array<std::array<std::size_t, 2>, 6> pairs{{{0, 0}, {4, 4}, {8, 8}, {1, 3}, {2, 6}, {5, 7}}};
+    return pairs[k];
+  };
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+    for (std::size_t entry : entries(k))
+      tensor[entry] = strain[k] * (k < 3 ? 1 : 0.5);
+  tensor = product(product(rotation, tensor), transposed(rotation));
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+    strain[k] = tensor[entries(k)[0]] * (k < 3 ? 1 : 2);
+}
+
 /// First of the columns of the deformation gradient, and of STATEV
 constexpr int first_gradient = 7, first_variable = 16;
 
@@ -81,7 +114,10 @@ Arguments<D> loaded(const Umat& law, const PointBatch<D>& points, Index i)
     a.variables[static_cast<std::size_t>(k)] = points.state[first_variable + k][i];
   for (std::size_t k = 0; k < 9; ++k)
     a.gradient_before[k] = points.state[first_gradient + static_cast<int>(k)][i] + (k % 4 == 0 ? 1 : 0);
-  a.gradient = product(deformation_increment(points, i), a.gradient_before);
+  const std::array<double, 9> f = deformation_increment(points, i);
+  a.gradient = product(f, a.gradient_before);
+  a.rotation = rotation_of(f);
+  turn_strain<D>(a.rotation, a.strain);
   a.time = points.time;
   a.duration = std::isfinite(points.dt) ? points.dt : 1;
   a.length = points.cell_size ? points.cell_size[i] : 1;
@@ -98,15 +134,15 @@ void call(const Umat& law, Index i, Arguments<D>& a)
   std::array<double, 6> ddsddt{}, drplde{};
   const std::array<double, 2> time{a.time, a.time};
   const std::array<double, 3> coords{};
-  constexpr std::array<double, 9> identity{1, 0, 0, 0, 1, 0, 0, 0, 1};
   const std::array<double, 9> before = transposed(a.gradient_before), after = transposed(a.gradient); // Fortran
+  const std::array<double, 9> rotation = transposed(a.rotation);
   const double zero = 0;
   std::array<char, 80> name;
   name.fill(' ');
   law.function(a.stress.data(), a.variables.data(), a.ddsdde.data(), &sse, &spd, &scd, &rpl, ddsddt.data(),
                drplde.data(), &drpldt, a.strain.data(), a.increment.data(), time.data(), &a.duration, &zero, &zero,
                &zero, &zero, name.data(), &normals, &shears, &tensor, &variables, law.properties.data(), &properties,
-               coords.data(), identity.data(), &a.new_step, &a.length, before.data(), after.data(), &one, &point, &none,
+               coords.data(), rotation.data(), &a.new_step, &a.length, before.data(), after.data(), &one, &point, &none,
                &one, step.data(), &one, name.size());
 }
 
@@ -125,7 +161,7 @@ void store(const Umat& law, const Arguments<D>& a, const PointBatch<D>& points, 
   for (std::size_t k = 0; k < n_stress<D>; ++k)
   {
     points.stress[k][i] = a.stress[abaqus_place[k]];
-    points.state[1 + k][i] += points.strain_increment[k][i];
+    points.state[1 + k][i] = a.strain[abaqus_place[k]] + points.strain_increment[k][i];
   }
   for (int k = 0; k < law.n_variables; ++k)
     points.state[first_variable + k][i] = a.variables[static_cast<std::size_t>(k)];

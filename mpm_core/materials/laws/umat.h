@@ -21,12 +21,13 @@ using UmatFunction = void (*)(double* stress, double* statev, double* ddsdde, do
 ///
 /// Called with NDI = 3 and NSHR = 1 in plane strain, 3 in three dimensions; components are put in Abaqus's order
 /// (11 22 33 12 13 23), engineering shear as there. STRAN and the deformation gradient are kept among the states; the
-/// increments of the latter multiply up to DFGRD0 and DFGRD1. The stress has been rotated with the material before the
-/// call, so DROT is the identity. Both entries of TIME are the time at the increment's start and DTIME is its duration;
-/// where loading is slow without limit (see PointBatch::dt) DTIME is one. CELENT is the size of the point's cell, one
-/// where there is none. COORDS, TEMP and fields are zero: a law that depends on temperature cannot be used. PNEWDT
-/// below one, or a stress that is not finite, counts as a failure. NOEL is one and NPT the point's number in its batch,
-/// from one. Source: Abaqus User Subroutines Reference Guide, UMAT.
+/// increments of the latter multiply up to DFGRD0 and DFGRD1. STRESS and STRAN have been rotated with the material
+/// before the call; DROT is that rotation, for tensors in STATEV, which the UMAT has to rotate. Both entries of TIME
+/// are the time at the increment's start and DTIME is its duration; where loading is slow without limit (see
+/// PointBatch::dt) DTIME is one. CELENT is the size of the point's cell, one where there is none. COORDS, TEMP and
+/// fields are zero: a law that depends on temperature cannot be used. PNEWDT below one, or a stress that is not finite,
+/// counts as a failure. NOEL is one and NPT the point's number in its batch, from one. Source: Abaqus User Subroutines
+/// Reference Guide, UMAT.
 struct Umat
 {
   UmatFunction function;

@@ -67,6 +67,68 @@ def test_deformation_of_a_point_multiplies_up(law):
         assert after[0] == pytest.approx(total, abs=1e-14)
 
 
+ROTATING = """
+void umat_(double* stress, double* statev, double* ddsdde, double* sse, double* spd, double* scd, double* rpl,
+           double* ddsddt, double* drplde, double* drpldt, const double* stran, const double* dstran,
+           const double* time, const double* dtime, const double* temp, const double* dtemp, const double* predef,
+           const double* dpred, const char* cmname, const int* ndi, const int* nshr, const int* ntens,
+           const int* nstatv, const double* props, const int* nprops, const double* coords, const double* drot)
+{
+  const int row[] = {0, 1, 2, 0, 0, 1}, column[] = {0, 1, 2, 1, 2, 2};
+  double before[3][3] = {{0}}, after[3][3] = {{0}};
+  for (int k = 0; k < *ntens; ++k)
+    before[row[k]][column[k]] = before[column[k]][row[k]] = statev[k];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      for (int k = 0; k < 3; ++k)
+        for (int l = 0; l < 3; ++l)
+          after[i][j] += drot[3 * k + i] * before[k][l] * drot[3 * l + j];
+  for (int k = 0; k < *ntens; ++k)
+  {
+    statev[k] = after[row[k]][column[k]];
+    statev[6 + k] = stran[k] + dstran[k];
+    ddsdde[k * (*ntens + 1)] = 1e5;
+  }
+}
+"""
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("scheme", ["explicit", "implicit"])
+def test_tensors_of_a_umat_turn_with_the_material(tmp_path, scheme, dim):
+    """Those in STATEV by DROT as the stress, which this law leaves as it is; and STRAN, before each increment adds to it."""
+    (tmp_path / "umat.c").write_text(ROTATING)
+    subprocess.run(["gcc", "-shared", "-fPIC", "-o", tmp_path / "umat.so", tmp_path / "umat.c"], check=True)
+    law = mpm.Umat(str(tmp_path / "umat.so"), properties=[0.0], n_variables=12, p_wave_modulus=1e5)
+    model, steps, dt = moving_box(law, dim), 4, 0.5  # shears by 0.02 and shortens by 0.03 in each step
+    components = [0, 1, 2, 3] if dim == 2 else [0, 1, 2, 3, 5, 4]  # in Abaqus's order
+    first = law.state_names.index("statev_1")
+    stress = np.tile([3.0, -1.0, 0.5, 2.0, 0.7, -0.4][: len(components)], (len(model.particles), 1))
+    state = np.zeros((len(stress), law.n_state))
+    state[:, first : first + len(components)] = stress[:, components]
+    model.particles.set("stress", stress)
+    model.particles.set("state", state)
+    if scheme == "explicit":
+        run(model, steps * dt, dt=dt, allow_unstable=True, energy_limit=None)
+    else:
+        list(model.implicit(steps * dt, dt=dt, quasi_static=True))
+    p = model.particles
+    assert np.abs(p.stress - stress).max() > 0.05
+    assert p.state[:, first : first + len(components)] == pytest.approx(p.stress[:, components], abs=1e-12)
+
+    gradient, strain = np.zeros((3, 3)), np.zeros((3, 3))  # of a step
+    gradient[range(dim), dim - 1] = dt * np.array([0.02] * (dim - 1) + [-0.03]) / 0.5
+    half_spin = 0.25 * (gradient - gradient.T)
+    turn = np.linalg.solve(np.eye(3) - half_spin, np.eye(3) + half_spin)
+    for _ in range(steps):
+        strain = turn @ strain @ turn.T + 0.5 * (gradient + gradient.T)
+    rows, columns = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
+    stran = ((strain + strain.T - np.diag(np.diag(strain)))[rows, columns])[: len(components)]
+    assert p.state[:, first + 6 : first + 6 + len(components)] == pytest.approx(
+        np.tile(stran, (len(stress), 1)), abs=1e-12
+    )
+
+
 def test_without_a_gradient_it_is_that_of_the_strain(law):
     state, stress = np.zeros((1, law.n_state)), np.zeros((1, 4))
     law.update(np.array([[0.01, 0.02, 0.03, 0.04]]), stress, state)
