@@ -35,6 +35,7 @@ class AbsorbingSides:
     _free_fields: list[Layers]  # by number, as they began
     _columns: list[GroundColumn]  # likewise; empty until a run needs them
     _tables: list[Any]  # what the core knows of their motion
+    _free_damping: Rayleigh | None  # of the free fields since they began to move; None before
     _incoming: tuple[list[float], list[float], list[float]] | None  # times, velocities, direction
 
     def absorb(
@@ -102,7 +103,7 @@ class AbsorbingSides:
         free_fields = [layers_at(self, tag) for tag in free]
         self._core.set_absorbing_sides(sides)
         self._absorbing, self._free_fields = sides, free_fields
-        self._columns, self._tables = [], []
+        self._columns, self._tables, self._free_damping = [], [], None
 
     def shake(self, motion: Motion, direction: ArrayLike) -> None:
         """Apply an incoming plane wave at the absorbing sides, at all of them at the same time: a base below level ground.
@@ -163,17 +164,31 @@ class AbsorbingSides:
                 "all sides that absorb have free fields beside them, expected a call of absorb for the base, through which the wave "
                 "comes in, before shake"
             )
-        if self._columns:
+        if self._free_damping is not None:
             raise InputError(
                 "free fields have begun to move, expected shake before the run, or absorb for these sides again"
             )
         self._take_incoming((motion.time.tolist(), (factor * motion.velocity).tolist(), unit))
 
+    def _check_free_fields(self, damping: float, rayleigh: Rayleigh) -> None:
+        """Raise InputError where free fields do not support the damping of a run."""
+        if damping and self._free_fields:
+            raise InputError(
+                f"damping is {damping} with free fields beside the sides, which support rayleigh only; expected 0"
+            )
+        if self._free_damping not in (None, rayleigh):
+            raise InputError(
+                f"rayleigh is {rayleigh}, expected {self._free_damping}, with which the free fields beside the sides have begun to "
+                "move; call absorb for these sides again to begin anew, when the ground is at rest"
+            )
+
     def _advance_free_fields(self, until: float, rayleigh: Rayleigh) -> None:
         """Give the core the motion of the free fields up to a time, on each rank alike."""
+        if self._free_fields:
+            self._free_damping = rayleigh
         if not self._columns:
             self._columns = [GroundColumn(layers, self.laws, self._base(), rayleigh) for layers in self._free_fields]
-        self._set_tables([(column.heights, *column.advance(until)) for column in self._columns])
+        self._set_tables([(column.heights, *column.advance(self._core.time, until)) for column in self._columns])
 
     def _set_tables(self, tables: list[Any]) -> None:
         self._tables = tables
@@ -199,11 +214,13 @@ class AbsorbingSides:
             return None
         nodes = {tuple(place): entry for part in self.comm.allgather(self._core.dashpots()) for place, entry in part}
         sides = [[tag, *map(_finite, numbers), free] for tag, *numbers, free in self._absorbing]
+        damping = self._free_damping
         return {
             "sides": sides,
             "nodes": [[place, nodes[place]] for place in sorted(nodes)],
             "incoming": self._incoming,
             "free_fields": [asdict(layers) for layers in self._free_fields],
+            "free_damping": None if damping is None else [_finite(number) for number in damping._as_core()],
         }
 
     def _take_absorbing(self, state: dict[str, Any] | None) -> None:
@@ -215,6 +232,8 @@ class AbsorbingSides:
         self._core.set_dashpots([(place, [tuple(entry) for entry in entries]) for place, entries in state["nodes"]])
         self._take_incoming(state["incoming"])
         self._free_fields = [Layers(**entry) for entry in state["free_fields"]]
+        damping = state.get("free_damping")  # not in older files
+        self._free_damping = None if damping is None else Rayleigh(*map(_given, damping))
         self._columns, self._tables = [], []  # a run begins them anew, and brings them to the present
 
     def _retake_absorbing(self, state: dict[str, Any] | None) -> None:

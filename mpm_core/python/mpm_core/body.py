@@ -84,7 +84,7 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
         self._retention = []
         self._absorbing, self._incoming = [], None
         self._border = None
-        self._free_fields, self._columns, self._tables = [], [], []
+        self._free_fields, self._columns, self._tables, self._free_damping = [], [], [], None
         self._contacts: list[dict[str, Any]] = []  # as checkpoints describe them
         self._collisions: list[dict[str, Any]] = []
         self._field_contacts: list[dict[str, Any]] = []

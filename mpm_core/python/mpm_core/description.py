@@ -126,6 +126,10 @@ _FREE = AnyOf([_NONE, _is_number])
 _SUPPORT = AnyOf([
     (_is_tag, lambda v: v is True, AnyOf([(), (_FREE, _FREE), (_FREE, _FREE, _FREE)])), (_is_tag, bool, AnyOf([(), *_VECTOR])),
 ])  # fmt: skip
+_SIDES = {
+    "sides": [(_is_tag, _FREE, _FREE, _FREE, _is_tag)], "nodes": [(_VECTOR, [list])], "incoming": AnyOf([_NONE, list]),
+    "free_fields": [dict]
+}  # fmt: skip
 _HISTORY = ([_is_number], [[_is_number]])
 _FIELD = {
     "name": str, "unit": str, "meaning": str, "components": lambda v: _is_count(v) and 0 < v < 1000, "initial": _is_number
@@ -177,10 +181,11 @@ _ENTRIES: dict[str, tuple[Any, str]] = {
         "a list of collisions",
     ),
     "absorbing": (
-        AnyOf([_NONE, {"sides": [(_is_tag, _FREE, _FREE, _FREE, _is_tag)], "nodes": [(_VECTOR, [list])],
-                       "incoming": AnyOf([_NONE, list]), "free_fields": [dict]}]),
+        AnyOf(
+            [_NONE, _SIDES, {**_SIDES, "free_damping": AnyOf([_NONE, (_FREE, _FREE, _FREE)])}]
+        ),  # without in older files
         "null, or the sides that absorb waves",
-    ),  # fmt: skip
+    ),
     "cuts": (_is_count, "a whole number from 0 on"),
     "left_imbalance": (_is_number, "a number"),
     "integration": (

@@ -120,8 +120,12 @@ class GroundColumn:
         """Time [s]."""
         return self._start + self._steps * self.dt
 
-    def advance(self, until: float) -> tuple[Floats, Floats, Floats]:
+    def advance(self, present: float, until: float) -> tuple[Floats, Floats, Floats]:
         """Step to a time or just beyond it.
+
+        Args:
+            present: time of the model [s]; a run that ended early leaves the column ahead of it.
+            until: [s].
 
         Returns:
             Times (m) [s], velocities (m, n + 1, D) [m/s] and tractions on the side since the start (m, n + 1, D) [Pa], from
@@ -130,12 +134,12 @@ class GroundColumn:
         Raises:
             RunError: a law failed.
         """
-        rows = self._rows[-2:]
+        past = sum(time <= present for time, _, _ in self._rows)
+        self._rows = self._rows[max(past - 1, 0) :]
         while self.time < until:
             viscous = self._step()
-            rows.append((self.time, self.velocity.copy(), self._tractions(viscous)))
-        self._rows = rows[-2:]
-        times, velocities, tractions = zip(*rows)
+            self._rows.append((self.time, self.velocity.copy(), self._tractions(viscous)))
+        times, velocities, tractions = zip(*self._rows)
         return np.array(times), np.array(velocities), np.array(tractions)
 
     def _state_of(self, law: Any, rows: NDArray[np.intp]) -> Floats:

@@ -232,10 +232,7 @@ class Model(ContactMethods, Body):
             raise InputError(
                 f"rebalance is {rebalance} with moving_cells, expected None: particles do not change their ranks then"
             )
-        if damping and self._free_fields:
-            raise InputError(
-                f"damping is {damping} with free fields beside the sides, which support rayleigh only; expected 0"
-            )
+        self._check_free_fields(damping, damped)
         integration = integration_of(self, integration)
         options, run, times, threshold, steps, limit, _ = collectively(
             self.comm,

@@ -174,6 +174,48 @@ def test_a_run_beside_free_fields_goes_on_from_a_checkpoint(tmp_path):
         np.testing.assert_array_equal(by_id(models[0], name), by_id(models[1], name))
 
 
+def test_a_run_that_ended_early_goes_on_beside_free_fields():
+    """The columns were computed up to the end of the run, ahead of the model; they do not wait for it there."""
+    moved = []
+    for early in (False, True):
+        model = site((6, 12), (0.5, 1.0), resting=True)
+        model.absorb(BASE)
+        model.absorb((LEFT, RIGHT), free_field=True)
+        model.shake(pulse(0.05), (1.0, 0.2))
+        if early:
+            next(iter(model.explicit(0.08, every_steps=20, conversion=None)))
+            assert 0 < model.time < 0.04
+        run(model, 0.08, conversion=None)
+        moved.append(by_id(model, "velocity"))
+    np.testing.assert_allclose(moved[1], moved[0], rtol=0, atol=1e-9 * np.abs(moved[0]).max())
+
+
+def test_free_fields_keep_the_damping_with_which_they_began(tmp_path):
+    def begun():
+        model = site((4, 4), (1.0, 1.0), resting=True)
+        model.absorb(BASE)
+        model.absorb((LEFT, RIGHT), free_field=True)
+        model.shake(pulse(1.0), (1, 0))
+        return model
+
+    first, other = mpm.Rayleigh(mass=1.0, plastic_strain=np.inf), mpm.Rayleigh(mass=2.0)
+    model = begun()
+    run(model, 1e-3, rayleigh=first, conversion=None)
+    model.save(tmp_path / "damped.h5")
+    restored = begun()
+    restored.restore(tmp_path / "damped.h5")
+    for one in (model, restored):
+        with pytest.raises(
+            mpm.InputError, match=r"rayleigh is Rayleigh\(mass=2.0, .*, expected Rayleigh\(mass=1.0, .*=inf\), with"
+        ):
+            one.explicit(2e-3, rayleigh=other)
+        with pytest.raises(mpm.InputError, match="free fields have begun to move"):
+            one.shake(pulse(1.0), (1, 0))
+        run(one, 2e-3, rayleigh=first, conversion=None)
+        one.absorb((LEFT, RIGHT), free_field=True)
+        run(one, 3e-3, rayleigh=other, conversion=None)
+
+
 def sloping_side():
     mesh = box((4, 4), place=lambda x: x + np.column_stack([0.3 * x[:, 1], 0 * x[:, 1]]))
     model = mpm.Model(mesh, SOFT)
