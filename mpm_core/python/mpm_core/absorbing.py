@@ -68,7 +68,7 @@ class AbsorbingSides:
 
         Raises:
             InputError: on all ranks: a side without soil, or beside a free field one that is not vertical; several velocity
-                fields, axial symmetry, numbers that are not positive.
+                fields, axial symmetry, numbers that are not positive, a shear wave that is faster than the compression wave.
 
         Note:
             Collective. For explicit steps. Dashpots do not limit the time step.
@@ -83,6 +83,11 @@ class AbsorbingSides:
                     positive("impedances[0]", given[0], "kg/(m2 s)"),
                     positive("impedances[1]", given[1], "kg/(m2 s)"),
                 )
+                if pair[0] < pair[1]:
+                    raise InputError(
+                        f"impedances is {pair} kg/(m2 s), expected that of the compression wave, the faster one, and then that of "
+                        "the shear wave"
+                    )
             flag("free_field", free_field)
             return [(tag, *pair, far) for tag in self.mesh.tags_of("facet", facet_tag)]
 
@@ -212,7 +217,7 @@ class AbsorbingSides:
         """State for a checkpoint: the sides, their nodes with forces and displacements, and the wave. Collective."""
         if not self._absorbing:
             return None
-        nodes = {tuple(place): entry for part in self.comm.allgather(self._core.dashpots()) for place, entry in part}
+        nodes = self._nodes_of_sides()
         sides = [[tag, *map(_finite, numbers), free] for tag, *numbers, free in self._absorbing]
         damping = self._free_damping
         return {
@@ -222,6 +227,10 @@ class AbsorbingSides:
             "free_fields": [asdict(layers) for layers in self._free_fields],
             "free_damping": None if damping is None else [_finite(number) for number in damping._as_core()],
         }
+
+    def _nodes_of_sides(self) -> dict[tuple[float, ...], list[Any]]:
+        """What the sides that absorb have at each of their nodes, by its place. Collective."""
+        return {tuple(place): entries for part in self.comm.allgather(self._core.dashpots()) for place, entries in part}
 
     def _take_absorbing(self, state: dict[str, Any] | None) -> None:
         """Restore the state from a checkpoint. Collective."""

@@ -61,6 +61,7 @@ def warn_of_setup(model: Model, nmd: bool, damping: float = 0.0, until: float = 
     of_laws = angles_in_radians(model.laws), *(_outside_of_surface(model, kind) for kind in SURFACES), locks
     of_sides = (
         *_held_sides(model),
+        _uncarried_weight(model),
         *_cut_motion(model),
         *_reversed_interfaces(model),
         _damped_waves(model, damping),
@@ -74,7 +75,7 @@ def warn_of_setup(model: Model, nmd: bool, damping: float = 0.0, until: float = 
 
 
 def _held_sides(model: Model) -> Iterator[str]:
-    """Of sides that absorb or let a wave in, those whose own boundary conditions leave no motion to them, or none along the wave."""
+    """Of sides that absorb, let a wave in or move with a free field, those whose own boundary conditions prevent it."""
     names = {tag: name for name, tags in model.mesh.names["facet"].items() for tag in tags}
     wave = np.array(model._incoming[2]) if model._incoming else None
     for tag, *_, beside in model._absorbing:
@@ -85,11 +86,46 @@ def _held_sides(model: Model) -> Iterator[str]:
                 f"the wave does not enter through the side {names.get(tag, tag)!r}: boundary conditions of the same facets hold it along "
                 f"{wave}, the direction of the wave; release them (model.release)"
             )
+        elif (
+            beside >= 0
+            and wave is not None
+            and any(np.abs(directions @ wave).max(initial=0.0) > 1e-9 for directions in held)
+        ):
+            yield (
+                f"the side {names.get(tag, tag)!r} does not move with the free field beside it: boundary conditions of the same facets "
+                f"hold it against {wave}, the direction of the wave; release them (model.release)"
+            )
         elif rank == model.mesh.dim:
             yield (
                 f"the side {names.get(tag, tag)!r} absorbs nothing: boundary conditions of the same facets hold it; release them "
                 "(model.release)"
             )
+
+
+def _uncarried_weight(model: Model) -> str:
+    """Of soil that nothing but sides without springs could carry, which did not hold its weight when they began to absorb."""
+    gravity = np.asarray(model.gravity)
+    size = float(np.linalg.norm(gravity))
+    others = (
+        model._contacts
+        or model._border is not None
+        or any(thickness < np.inf for _, _, _, thickness, _ in model._absorbing)
+    )
+    is_rigid = any(np.isinf(normal) for _, normal, *_ in model._absorbing)
+    if size == 0 or not model._absorbing or others or is_rigid:
+        return ""
+    along = [np.abs(_held_directions(condition) @ gravity).max(initial=0.0) for condition in model._conditions]
+    if max(along, default=0.0) > 1e-9 * size:
+        return ""
+    weight = size * model.comm.allreduce(float(model.particles.mass.sum()))
+    held = [entry[2] for entries in model._nodes_of_sides().values() for entry in entries]
+    carried = max(0.0, -float(np.sum(held @ gravity)) / size)
+    if carried >= 0.5 * weight:
+        return ""
+    return (
+        f"nothing carries the soil: the sides that absorb held {carried:.3g} N of its weight of {weight:.3g} N when absorb was "
+        "called, and go on to hold that: find the equilibrium under gravity on supports, then release these and call absorb"
+    )
 
 
 def _held_directions(condition: tuple[int, bool, list[float | None]]) -> NDArray[np.float64]:

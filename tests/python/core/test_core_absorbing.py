@@ -204,6 +204,7 @@ def test_a_run_with_absorbing_sides_goes_on_from_a_checkpoint(tmp_path):
         (lambda model: model.absorb(9), "facet_tag"),
         (lambda model: model.absorb(2, thickness=0.0), "thickness is 0.0 m, expected a positive number"),
         (lambda model: model.absorb(2, impedances=(1.0, -1.0)), r"impedances\[1\] is -1.0"),
+        (lambda model: model.absorb(2, impedances=(1.0, 2.0)), r"impedances is \(1.0, 2.0\) kg/\(m2 s\), expected that of the compression"),
         (lambda model: model.shake(mpm.Motion([0, 1], [0, 1]), (1, 0)), "no side absorbs"),
         (lambda model: model.absorb(2, free_field="no"), "free_field is 'no', expected True or False"),
         (lambda model: model.absorb(2) or model.shake(3.0, (1, 0)), "motion is 3.0, expected a Motion"),

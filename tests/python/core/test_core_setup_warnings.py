@@ -167,6 +167,39 @@ def test_a_side_that_is_held_and_absorbs_is_warned_of():
     assert not any("absorbs nothing" in text for text in shaken(lambda model: model.roller(3, (1, 0)), let_in=None))
 
 
+def test_a_side_that_is_held_against_its_free_field_is_warned_of():
+    text = (
+        "the side 1 does not move with the free field beside it: boundary conditions of the same facets hold it against"
+    )
+
+    def beside(normal, direction):
+        def hold(model):
+            model.absorb(3)
+            model.absorb((1, 2), free_field=True)
+            model.roller(1, normal)
+
+        return any(text in each for each in shaken(hold, let_in="shake", direction=direction))
+
+    assert beside((1, 0), (1, 0)) and beside((1, 0), (1, 1)) and beside((0, 1), (0, 1))
+    assert not beside((0, 1), (1, 0)) and not beside((1, 0), (0, 1))
+
+
+@pytest.mark.parametrize("stressed", [True, False])
+@pytest.mark.parametrize("carried", ["side", "side and roller", "springs"])
+def test_weight_that_sides_did_not_hold_as_they_began_to_absorb_is_warned_of(stressed, carried):
+    model = model_of(mpm.LinearElastic(young=1e6, poisson=0.3), held=False)
+    x = model.mesh.points[model.mesh.cells].mean(axis=1)[model.particles.cell]
+    vertical = (
+        -2000.0 * 9.81 * (1 - (np.floor(2 * x[:, 1]) + 0.5) / 2) * stressed
+    )  # of the middle of each row of squares
+    model.particles.set("stress", np.column_stack([0 * vertical, vertical, 0 * vertical, 0 * vertical]))
+    model.absorb(3, thickness=100.0 if carried == "springs" else np.inf)
+    if carried == "side and roller":
+        model.roller(2, (0, 1))
+    warned = any("nothing carries the soil: the sides that absorb held" in text for text in said(model))
+    assert warned == (not stressed and carried == "side")
+
+
 def test_a_motion_that_is_cut_off_is_warned_of():
     free = lambda model: None  # noqa: E731
     assert any("ends at 100% of its" in text for text in shaken(free, motion=((0.0, 1.0), (0.0, 1e-3))))
@@ -176,7 +209,7 @@ def test_a_motion_that_is_cut_off_is_warned_of():
 
 @pytest.mark.parametrize("let_in", ["shake", "drive", None])
 def test_local_damping_where_a_motion_enters_is_warned_of(let_in):
-    free = lambda model: model.set_gravity((0.0, -9.81))  # noqa: E731
+    free = lambda model: model.roller(1, (0, 1)) or model.set_gravity((0.0, -9.81))  # noqa: E731
     found = [
         text for text in shaken(free, let_in=let_in, damping=0.05) if "damping is 0.05 where a motion enters" in text
     ]
