@@ -61,6 +61,7 @@ def warn_of_setup(model: Model, nmd: bool, damping: float = 0.0, until: float = 
     of_laws = angles_in_radians(model.laws), *(_outside_of_surface(model, kind) for kind in SURFACES), locks
     of_sides = (
         *_held_sides(model),
+        _held_border(model),
         _uncarried_weight(model),
         *_cut_motion(model),
         *_reversed_interfaces(model),
@@ -100,6 +101,27 @@ def _held_sides(model: Model) -> Iterator[str]:
                 f"the side {names.get(tag, tag)!r} absorbs nothing: boundary conditions of the same facets hold it; release them "
                 "(model.release)"
             )
+
+
+def _held_border(model: Model) -> str:
+    """Of a far field most of whose nodes cannot move."""
+    border, mesh = model._border, model.mesh
+    if border is None:
+        return ""
+    directions: dict[int, list[NDArray[np.float64]]] = {}
+    for condition in model._conditions:
+        directions.setdefault(condition[0], []).append(_held_directions(condition))
+    fixed = [tag for tag, held in directions.items() if _rank([np.zeros((1, mesh.dim)), *held]) == mesh.dim]
+    cell, vertex = np.nonzero(np.isin(mesh._core.facet_tags, fixed))
+    nodes = [np.delete(mesh.cells[c], k) for c, k in zip(cell, vertex)]
+    own = mesh.global_nodes[np.unique(np.concatenate(nodes))] if nodes else []
+    count = int(np.count_nonzero(model.comm.allreduce(np.isin(border.nodes, own).astype(int))))
+    if 2 * count <= len(border.nodes):
+        return ""
+    return (
+        f"boundary conditions hold {count} of the {len(border.nodes)} nodes of the far field, whose ground then has no effect on them; "
+        "release the border (model.release)"
+    )
 
 
 def _uncarried_weight(model: Model) -> str:

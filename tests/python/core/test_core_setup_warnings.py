@@ -184,6 +184,23 @@ def test_a_side_that_is_held_against_its_free_field_is_warned_of():
     assert not beside((0, 1), (1, 0)) and not beside((1, 0), (0, 1))
 
 
+def test_a_far_field_that_boundary_conditions_hold_is_warned_of():
+    def warned(hold):
+        model = model_of(mpm.LinearElastic(young=1e6, poisson=0.3), held=False)
+        rollers(model, [0])
+        hold(model)
+        base = np.flatnonzero(model.mesh.points[:, 1] == 0)
+        model.attach_far_field(base, 1e6 * np.eye(2 * len(base)))
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            model.implicit(1.0, dt=1.0, quasi_static=True).last()
+        return any("hold 3 of the 3 nodes of the far field" in str(each.message) for each in caught)
+
+    assert warned(lambda model: model.fix(3))
+    assert warned(lambda model: model.roller(3, (0, 1)) or model.roller(3, (1, 0)))
+    assert not warned(lambda model: None) and not warned(lambda model: model.roller(3, (1, 0)))
+
+
 @pytest.mark.parametrize("stressed", [True, False])
 @pytest.mark.parametrize("carried", ["side", "side and roller", "springs"])
 def test_weight_that_sides_did_not_hold_as_they_began_to_absorb_is_warned_of(stressed, carried):
