@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from core_cases import box, rollers, run
+from core_cases import box, by_id, rollers, run
 from implicit_cases import floor
 from law_cases import Batch, assert_tangent, random_points
 
@@ -97,6 +97,24 @@ def test_explicit_run_is_that_of_the_core_law(law, dim):
         assert (model.particles.plastic_strain > 0).mean() > 0.1
     stress = [m.particles.stress[np.argsort(m.particles.id)] for m in models]
     assert np.abs(stress[0] - stress[1]).max() < 1e-6 * np.abs(stress[1]).max()
+
+
+def test_a_law_that_names_angles_of_zero_is_averaged_as_soil_without_friction(library):
+    """In full, as the core's law; one that names nothing, as frictional soil without dilation, by half (docs/howto/law.md)."""
+    names = ("strength", "friction angle", "dilation angle")
+    python = VonMises()
+    python.phi = python.psi = 0.0
+    python.strength_parameters = dict(zip(("strength", "phi", "psi"), names))
+    named = umat(
+        library, properties=[YOUNG, POISSON, STRENGTH, 0.0, 0.0], strength_parameters=dict(zip((3, 4, 5), names))
+    )
+    models = [column(law, 2) for law in (NATIVE, mpm.PythonLaw(python), named, umat(library))]
+    for model in models:
+        run(model, 0.05, damping=0.2, nmd=True, integration=mpm.Integration.MIXED)
+    native, *others, unnamed = (by_id(model, "stress") for model in models)
+    for stress in others:
+        assert np.abs(stress - native).max() < 1e-6 * np.abs(native).max()
+    assert np.abs(unnamed - native).max() > 0.05 * np.abs(native).max()
 
 
 def test_implicit_run_is_that_of_the_core_law(law):
