@@ -214,7 +214,6 @@ class FarField:
         """
         require_same_geometry(model, self)
         border = self.on_mesh(model.mesh, facet_tag)
-        self._gravity = model.gravity if balanced else np.zeros(model.mesh.dim)
         model.attach_far_field(border.nodes, border.stiffness, border.mass, balanced=balanced)
 
     def on_mesh(self, mesh: mpm.Mesh, facet_tag: int | str | Sequence[int | str]) -> Border:
@@ -258,7 +257,7 @@ class FarField:
         """
         moved = model.far_field_displacement
         border = np.stack([self._projection[a] @ moved[:, a] for a in range(moved.shape[1])], axis=1)
-        added = model.gravity - self._gravity
+        added = model.gravity - model.far_field_gravity
         return self._displaced(border, sum(g * load for g, load in zip(added, self._loads, strict=True)))
 
 

@@ -108,7 +108,8 @@ def _is_surface(value: Any) -> bool:
 
 def _is_border(value: Any) -> bool:
     """Whether it is the state of a far field, with a row for each node of its border."""
-    if not _has_shape(value, {"marks": [_is_number], "held": [_VECTOR], "displacement": [_VECTOR]}):
+    older = {"marks": [_is_number], "held": [_VECTOR], "displacement": [_VECTOR]}
+    if not _has_shape(value, AnyOf([{**older, "gravity": _VECTOR}, older])):
         return False
     n = value["marks"][0] if len(value["marks"]) == 3 else -1
     return len(value["held"]) == n and len(value["displacement"]) == n

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,12 +16,13 @@ from .mesh import Mesh, floats
 
 @dataclass(frozen=True)
 class _Border:
-    """Border of a far field: its nodes, stiffness and mass."""
+    """Border of a far field: its nodes, stiffness and mass, its held forces, and the gravity that they balance."""
 
     nodes: NDArray[np.int64]
     stiffness: NDArray[np.float64]
     mass: NDArray[np.float64]
     held: NDArray[np.float64]
+    gravity: NDArray[np.float64]
 
     def marks(self) -> list[float]:
         """Numbers of the same far field are the same whatever the ranks, but for round-off."""
@@ -75,15 +76,15 @@ class FarFields:
             if np.abs(matrix - matrix.T).max(initial=0.0) > 1e-8 * np.abs(matrix).max(initial=0.0):
                 raise InputError("stiffness is not symmetric, expected that of an elastic body")
             weight = floats("mass", np.zeros((n, d, d)) if mass is None else mass, (n, d, d))
-            return _Border(numbers.astype(np.int64), matrix, weight, np.zeros((n, d)))
+            return _Border(numbers.astype(np.int64), matrix, weight, np.zeros((n, d)), np.zeros(d))
 
         border = collectively(self.comm, checked)
         _refuse(self)
         unbalanced = np.array(self._core.unbalanced_at(border.nodes.tolist())).reshape(border.held.shape)
         if balanced:
-            weight = border.mass @ np.asarray(self._core.gravity)
-            held = -self.comm.allreduce(unbalanced) - weight
-            border = _Border(border.nodes, border.stiffness, border.mass, held)
+            gravity = np.array(self._core.gravity)
+            held = -self.comm.allreduce(unbalanced) - border.mass @ gravity
+            border = replace(border, held=held, gravity=gravity)
         self._take_border(border, np.zeros_like(border.held))
 
     def detach_far_field(self) -> None:
@@ -101,10 +102,21 @@ class FarFields:
             raise InputError("the model has no far field, expected attach_far_field before")
         return np.array(self._core.far_field_displacement).reshape(self._border.held.shape)
 
+    @property
+    def far_field_gravity(self) -> NDArray[np.float64]:
+        """Gravity for which the far field was `balanced` as it was attached [m/s2], (D,); zero where it was not.
+
+        Raises:
+            InputError: there is no far field.
+        """
+        if self._border is None:
+            raise InputError("the model has no far field, expected attach_far_field before")
+        return self._border.gravity.copy()
+
     def _take_border(self, border: _Border | None, displacement: NDArray[np.float64] | None) -> None:
         self._border = border
         d = self.mesh.dim
-        none = _Border(np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros((0, d, d)), np.zeros((0, d)))
+        none = _Border(np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros((0, d, d)), np.zeros((0, d)), np.zeros(d))
         b = border or none
         self._core.set_far_field(
             b.nodes.tolist(), b.stiffness, b.mass, b.held, b.held * 0 if displacement is None else displacement
@@ -117,6 +129,7 @@ class FarFields:
         return {
             "marks": self._border.marks(),
             "held": self._border.held.tolist(),
+            "gravity": self._border.gravity.tolist(),
             "displacement": self.far_field_displacement.tolist(),
         }
 
@@ -125,8 +138,9 @@ class FarFields:
         border = self._border
         if state is None or border is None:
             return
-        held = np.array(state["held"])
-        self._take_border(_Border(border.nodes, border.stiffness, border.mass, held), np.array(state["displacement"]))
+        gravity = np.array(state.get("gravity", border.gravity))  # not in older files
+        taken = replace(border, held=np.array(state["held"]), gravity=gravity)
+        self._take_border(taken, np.array(state["displacement"]))
 
 
 def require_border(model: Any, path: str, state: dict[str, Any] | None) -> None:

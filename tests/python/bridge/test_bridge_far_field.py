@@ -184,7 +184,7 @@ def test_displacements_of_the_ground_are_those_of_particles_there():
     assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
 
 
-def test_a_balanced_far_field_holds_the_soil_as_it_is():
+def test_a_balanced_far_field_holds_the_soil_as_it_is(tmp_path):
     """In equilibrium nothing moves; a load then adds what it does without weight."""
     held, _ = footing(COMM, 20, 5, reach=(4.0, 4.0), gravity=(0.0, -1.0))
     held.detach_far_field()
@@ -202,7 +202,15 @@ def test_a_balanced_far_field_holds_the_soil_as_it_is():
     loaded(free, small_displacements=True)
     moved, expected = (displacement_at(model, PLACES) for model in (held, free))
     assert np.abs(moved - expected).max() < 1e-8 * np.abs(expected).max()
-    assert np.abs(far.displacement(held).x.array).max() == pytest.approx(np.abs(moved[3:]).max(), rel=0.5)
+    beyond = far.displacement(held).x.array
+    assert np.abs(beyond).max() == pytest.approx(np.abs(moved[3:]).max(), rel=0.5)
+
+    # After a restart, whatever the gravity was as the far field was attached there
+    held.save(tmp_path / "loaded.h5")
+    resumed, same = footing(COMM, 20, 5, reach=(4.0, 4.0))
+    resumed.restore(tmp_path / "loaded.h5")
+    assert np.array_equal(same.displacement(resumed).x.array, beyond)
+    assert resumed.far_field_gravity.tolist() == [0.0, -1.0] and free.far_field_gravity.tolist() == [0.0, 0.0]
 
 
 @pytest.mark.parametrize("solver", [mpm.Newton(), mpm.Relaxation(tolerance=1e-9)])
