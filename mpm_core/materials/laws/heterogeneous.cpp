@@ -3,6 +3,7 @@
 #include "materials/laws/strength_reduction.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace mpm::materials
 {
@@ -21,7 +22,7 @@ std::vector<Parameter<L>> varying_parameters(const std::vector<std::string>& nam
 }
 
 template <class L>
-void check_names(const L&, const std::vector<std::string>& names)
+void check_names(const L& law, const std::vector<std::string>& names)
 {
   std::string known;
   for (const Parameter<L>& parameter : L::parameters())
@@ -34,6 +35,9 @@ void check_names(const L&, const std::vector<std::string>& names)
       throw InputError("varying has '" + name + "', expected parameters of the law that are numbers: " + known);
     if (std::count(names.begin(), names.end(), name) > 1)
       throw InputError("varying has '" + name + "' twice");
+    if (!std::isfinite(varying_parameters<L>({name}).front().value(law))) // points have differences from it
+      throw InputError("varying has '" + name +
+                       "', which is infinite in the law, expected a law in which it is finite");
   }
 }
 

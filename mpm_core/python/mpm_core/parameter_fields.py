@@ -60,7 +60,7 @@ def parameter_values(
     if callable(given):
         given = given(position)
     elif np.ndim(given) == 0:
-        given = np.full(len(position), given, dtype=float)
+        return np.full(len(position), floats(name, [given], (1,))[0])
     return floats(name, given, (len(position),))
 
 

@@ -145,6 +145,10 @@ def test_wrong_parameters_are_named():
         mpm.Heterogeneous(soil, [])
     with pytest.raises(mpm.InputError, match="varying has 'cohesion' twice"):
         mpm.Heterogeneous(soil, ["cohesion", "cohesion"])
+    with pytest.raises(
+        mpm.InputError, match="varying has 'tension_cutoff', which is infinite in the law, expected a law"
+    ):
+        mpm.Heterogeneous(soil, ["tension_cutoff"])
     model = layered_model([soil, mpm.Heterogeneous(soil, ["cohesion", "dilation_angle", "young"])])
     model.assign(np.ones(len(model.particles), dtype=int))
     with pytest.raises(
@@ -155,6 +159,8 @@ def test_wrong_parameters_are_named():
         model.set_parameter("cohesion", -1.0)
     with pytest.raises(mpm.InputError, match=r"^dilation_angle = 26, but it must be in \[0, friction_angle\]"):
         model.set_parameter("dilation_angle", 26.0)
+    with pytest.raises(mpm.InputError, match="cohesion has dtype .*, expected real numbers"):
+        model.set_parameter("cohesion", "large")
     with pytest.raises(mpm.InputError, match="cohesion is nan at index"):
         model.set_parameter("cohesion", lambda x: np.full(len(x), np.nan))
     with pytest.raises(mpm.InputError, match="which bounds the time step; give the law the largest stiffness"):
