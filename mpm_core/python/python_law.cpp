@@ -145,6 +145,22 @@ py::object with_attributes(const py::object& law, const py::dict& changed)
   return copy;
 }
 
+/// A member of a Python object
+/// @throws InputError it is of another type
+template <class T>
+T member(const py::object& law, const std::string& name, const char* expected)
+{
+  const py::object value = law.attr(name.c_str());
+  try
+  {
+    return value.cast<T>();
+  }
+  catch (const py::cast_error&)
+  {
+    throw InputError("law has the " + name + " " + py::repr(value).cast<std::string>() + ", expected " + expected);
+  }
+}
+
 /// What a Python object says of its strength, if it names it, in the law that is made of it
 void add_strength(const py::object& law, ExternalLaw& made)
 {
@@ -152,10 +168,13 @@ void add_strength(const py::object& law, ExternalLaw& made)
     return;
   std::vector<std::string> names;
   std::vector<StrengthKind> kinds;
+  if (!py::isinstance<py::dict>(law.attr("strength_parameters")))
+    throw InputError("law has the strength_parameters " +
+                     py::repr(law.attr("strength_parameters")).cast<std::string>() + ", expected a dictionary");
   for (const auto& [name, kind] : law.attr("strength_parameters").cast<py::dict>())
   {
-    names.push_back(name.cast<std::string>());
-    kinds.push_back(strength_kind(kind.cast<std::string>()));
+    names.push_back(py::str(name));
+    kinds.push_back(strength_kind(std::string(py::str(kind))));
     if (!py::hasattr(law, names.back().c_str()))
       throw InputError("law names " + names.back() + " in strength_parameters, but has no such attribute");
   }
@@ -166,7 +185,7 @@ void add_strength(const py::object& law, ExternalLaw& made)
   {
     std::vector<double> values;
     for (const std::string& name : names)
-      values.push_back(law.attr(name.c_str()).cast<double>());
+      values.push_back(member<double>(law, name, "a number"));
     return values;
   };
   made.association = associated_fraction(kinds, values_now());
@@ -185,7 +204,9 @@ ExternalLaw python_law(const py::object& law)
   for (const char* member : {"n_state", "p_wave_modulus", "update"})
     if (!py::hasattr(law, member))
       throw InputError("law is " + py::repr(law).cast<std::string>() + ", which has no " + member);
-  const int states = law.attr("n_state").cast<int>();
+  if (py::isinstance<py::type>(law))
+    throw InputError("law is the class " + law.attr("__name__").cast<std::string>() + ", expected an object of it");
+  const int states = member<int>(law, "n_state", "a whole number");
   if (states < 1)
     throw InputError("law has n_state " + std::to_string(states) +
                      ", expected at least 1: the first is the accumulated plastic deviatoric strain");
@@ -193,7 +214,7 @@ ExternalLaw python_law(const py::object& law)
   for (int k = 1; k < states; ++k)
     names.push_back("state_" + std::to_string(k));
   if (py::hasattr(law, "state_names"))
-    names = law.attr("state_names").cast<std::vector<std::string>>();
+    names = member<std::vector<std::string>>(law, "state_names", "a list of names");
   if (static_cast<int>(names.size()) != states || names.front() != "plastic_strain")
     throw InputError("law has state_names of another number than n_state, or not plastic_strain as the first");
   const bool takes_increment =
@@ -201,7 +222,7 @@ ExternalLaw python_law(const py::object& law)
   const PythonObject object{law, states, takes_increment};
   ExternalLaw made{"PythonLaw of " + py::type::of(law).attr("__name__").cast<std::string>(),
                    std::move(names),
-                   law.attr("p_wave_modulus").cast<double>(),
+                   member<double>(law, "p_wave_modulus", "a number [Pa]"),
                    [object](const PointBatch<2>& points) { return called(object, points); },
                    [object](const PointBatch<3>& points) { return called(object, points); },
                    law.ptr(),

@@ -125,6 +125,31 @@ def test_implicit_run_is_that_of_the_core_law(law):
     assert np.abs(models[0].particles.displacement - models[1].particles.displacement).max() < 1e-9
 
 
+@pytest.mark.parametrize(
+    "member, message",
+    [
+        ({"n_state": 1.5}, "law has the n_state 1.5, expected a whole number"),
+        ({"p_wave_modulus": "stiff"}, r"law has the p_wave_modulus 'stiff', expected a number \[Pa\]"),
+        ({"state_names": 3}, "law has the state_names 3, expected a list of names"),
+        (
+            {"strength_parameters": ["strength"]},
+            r"law has the strength_parameters \['strength'\], expected a dictionary",
+        ),
+        ({"strength_parameters": {"name": "strength"}, "name": "clay"}, "law has the name 'clay', expected a number"),
+    ],
+)
+def test_members_of_a_python_law_that_are_something_else_are_named(member, message):
+    law = VonMises()
+    vars(law).update(member)
+    with pytest.raises(mpm.InputError, match=message):
+        mpm.PythonLaw(law)
+
+
+def test_a_class_in_place_of_a_law_is_refused():
+    with pytest.raises(mpm.InputError, match="law is the class VonMises, expected an object of it"):
+        mpm.PythonLaw(VonMises)
+
+
 class Broken:
     n_state, p_wave_modulus = 1, 1e6
 
