@@ -11,6 +11,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from . import _core
+from .mesh import cell_sizes
 from .water_checks import undrained_friction
 
 if TYPE_CHECKING:
@@ -44,6 +45,9 @@ RETURNED = 0.01
 CUT_MOTION = 0.05
 """Fraction of the largest velocity of a motion at its ends above which it is probably cut off"""
 
+STIFFER = 2.0
+"""Stiffness of an external law over the modulus that it states, above which the time step is far from the critical one"""
+
 TILTED = 1e-6
 """Fraction of gravity across the last axis above which it is more than round-off"""
 
@@ -58,7 +62,12 @@ def warn_of_setup(model: Model, nmd: bool, damping: float = 0.0, until: float = 
     """
     locks = "" if nmd else locking(model.laws)
     of_loads = _nothing_acts(model), _nothing_holds(model), _upwards(model), _weight(model) or _softness(model)
-    of_laws = angles_in_radians(model.laws), *(_outside_of_surface(model, kind) for kind in SURFACES), locks
+    of_laws = (
+        angles_in_radians(model.laws),
+        *_stiffer_than_said(model),
+        *(_outside_of_surface(model, kind) for kind in SURFACES),
+        locks,
+    )
     of_sides = (
         *_held_sides(model),
         _held_border(model),
@@ -325,6 +334,35 @@ def _outside_of_surface(model: Model, kind: Any) -> str:
     if not outside:
         return ""
     return f"stresses of {outside / total:.1%} of the particles of {kind.__name__} {SURFACES[kind]}"
+
+
+def _stiffer_than_said(model: Model) -> Iterator[str]:
+    """Of laws in Python and UMATs whose modulus for the critical time step is too small, before the first step."""
+    for number, law in enumerate(model.laws):
+        if model.steps > 0 or not isinstance(list(with_inner_laws(law))[-1], (_core.PythonLaw, _core.Umat)):
+            continue
+        rows = np.flatnonzero(model.particles.material == number)[:100]
+        modulus = model.comm.allreduce(_compression_modulus(model, law, rows) if len(rows) else 0.0, MPI.MAX)
+        if modulus > STIFFER * law.p_wave_modulus:
+            yield (
+                f"the modulus of compression of {law.name} is {modulus:.3g} Pa in some particles, above its p_wave_modulus of "
+                f"{law.p_wave_modulus:.3g} Pa, which limits the time step: explicit steps may be unstable"
+            )
+
+
+def _compression_modulus(model: Model, law: Any, rows: NDArray[np.intp]) -> float:
+    """Largest modulus [Pa] of particles of a law that are compressed a little along the first axis, as they are now."""
+    p, strain, dim = model.particles, 1e-7, model.mesh.dim
+    size = cell_sizes(model.cell_volumes, dim)[p.cell[rows]]
+    stresses = []
+    for compression in (0.0, strain):  # without strain, stresses beyond the yield surface return to it
+        increment, deformation = np.zeros_like(p.stress[rows]), np.tile(np.eye(dim), (len(rows), 1, 1))
+        increment[:, 0] -= compression
+        deformation[:, 0, 0] -= compression
+        stress, state = p.stress[rows], np.ascontiguousarray(p.state[rows, : law.n_state])
+        law.update(increment, stress, state, time=model.time, cell_size=size, deformation=deformation)
+        stresses.append(stress[:, 0])
+    return float(((stresses[0] - stresses[1]) / strain).max())
 
 
 def angles_in_radians(laws: Iterable[Any]) -> str:

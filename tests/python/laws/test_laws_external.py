@@ -1,7 +1,9 @@
 """Laws written in Python, and Abaqus UMATs: a small one in Fortran, compiled here, against the same law of the core."""
 
+import re
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -148,6 +150,21 @@ def test_members_of_a_python_law_that_are_something_else_are_named(member, messa
 def test_a_class_in_place_of_a_law_is_refused():
     with pytest.raises(mpm.InputError, match="law is the class VonMises, expected an object of it"):
         mpm.PythonLaw(VonMises)
+
+
+@pytest.mark.parametrize("said", [0.4, 0.6])
+def test_a_law_that_is_stiffer_than_it_says_is_warned_of(library, said):
+    python = VonMises()
+    python.p_wave_modulus = said * NATIVE.p_wave_modulus
+    for law in (mpm.PythonLaw(python), umat(library, p_wave_modulus=said * NATIVE.p_wave_modulus)):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            run(column(law, 2), 1e-4)
+        texts = [str(each.message) for each in caught if "the modulus of compression of" in str(each.message)]
+        assert len(texts) == (said < 0.5)
+        assert all(
+            re.search(r"is 2.69e\+07 Pa in some particles, above its p_wave_modulus of 1.08e\+07 Pa", t) for t in texts
+        )
 
 
 class Broken:
