@@ -216,8 +216,9 @@ bool accept_step(Model<G>& model, const ImplicitStep<G>& step)
   const EnergyBook energy = model.energy;
   update_pore_water(model, step);
   keep_slip(model, step);
-  particle_pass(model, {step.dt, !options.hold_positions, true, pic, options.nmd, law_dt(step),
-                        options.hold_positions}); // (18), (20), stresses
+  particle_pass(model,
+                {step.dt, !options.hold_positions, true, pic, options.nmd, law_dt(step), options.hold_positions,
+                 Transfer::flip, false, options.hold_positions && options.count_displacement}); // (18), (20), stresses
   agree_on_failure(model);
   if (model.failure)
   {

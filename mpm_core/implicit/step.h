@@ -24,8 +24,9 @@ struct ImplicitOptions
   GhostOptions ghost;                               ///< of the remedy for nodes with hardly any mass
   bool second_order = false;                        ///< two stages instead of backward Euler; with inertia only
   bool quasi_static = false;                        ///< no inertia: f_ext - f_int(u) = 0; particles end at rest
-  bool hold_positions = false; ///< small displacements: only stresses change, not places and volumes; quasi-static
-  bool at_rest = false;        ///< laws are given all time, however long the step: stresses above the strength relax
+  bool hold_positions = false;    ///< small displacements: only stresses change, not places and volumes; quasi-static
+  bool count_displacement = true; ///< with small displacements: of particles and resting cells, as if they had moved
+  bool at_rest = false;           ///< laws are given all time, however long the step: stresses above the strength relax
   double load_fraction = 1; ///< of f_ext - f_int at the step's start that the step applies; below 1 where quasi-static
 };
 

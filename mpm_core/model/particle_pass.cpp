@@ -175,7 +175,7 @@ void pass_batch(Model<G>& model, const PassOptions& options, const Batch& batch,
   find_motions(model.mesh, field, runs, options, batch, scratch);
   if (options.move)
     move_batch(model, field, options, batch, scratch);
-  else if (options.small)
+  else if (options.count_displacement)
     for (std::size_t r = batch.first_run; r < batch.last_run; ++r)
       count_displacement<D>(model.particles, runs[r].first, runs[r].last, model.mesh.shapes[runs[r].cell],
                             scratch.motion[r - batch.first_run]);

@@ -17,7 +17,8 @@ struct PassOptions
   double law_dt;       ///< duration of the increment for laws [s]; infinite where they are given all time
   bool small = false;  ///< small displacements: the strain changes stresses only, not volumes, and rotates nothing
   Transfer transfer = Transfer::flip;
-  bool moving_cells = false; ///< the cells move with the particles, which stay in them
+  bool moving_cells = false;       ///< the cells move with the particles, which stay in them
+  bool count_displacement = false; ///< of particles that do not move: as if they had
 };
 
 /// Goes once over the particles, batch by batch, each run of particles in one cell at a time: moves them with the nodal

@@ -279,7 +279,7 @@ void resting_pass(Model<G>& model, const PassOptions& options)
   RestingCells<G::dim>& resting = field.resting;
   if (resting.runs.empty())
     return;
-  if (options.move || options.small)
+  if (options.move || options.count_displacement)
     move_resting_nodes(model, options);
   if (!options.stress)
     return;

@@ -266,6 +266,7 @@ void bind_implicit(py::module_& m)
       .def_readwrite("ghost", &ImplicitOptions::ghost)
       .def_readwrite("at_rest", &ImplicitOptions::at_rest)
       .def_readwrite("hold_positions", &ImplicitOptions::hold_positions)
+      .def_readwrite("count_displacement", &ImplicitOptions::count_displacement)
       .def_readwrite("load_fraction", &ImplicitOptions::load_fraction)
       .def_readwrite("second_order", &ImplicitOptions::second_order)
       .def_readwrite("quasi_static", &ImplicitOptions::quasi_static);

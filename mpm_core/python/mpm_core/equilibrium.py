@@ -88,6 +88,8 @@ def _found_equilibrium(model: Model, solver: Any, options: Any, tolerance: float
             continue
         if options.hold_positions:
             ghost.stiffness *= FADING
+        else:
+            options.count_displacement = False
         options.ghost, options.hold_positions = ghost, True
         if model.report().unbalanced_ratio <= tolerance:
             return stepper.report()

@@ -32,6 +32,16 @@ def test_a_body_is_quasi_static_after_it_has_been_brought_to_equilibrium():
     assert model.equilibrate(tolerance=1e-4).is_quasi_static(1e-3)
 
 
+def test_displacements_of_an_equilibration_are_those_by_which_particles_have_moved():
+    """Also where steps that only redistribute stresses follow the one that moves particles."""
+    model = slope(0.1, weight=20e3)
+    start = model.particles.position[np.argsort(model.particles.id)]
+    model.equilibrate(nmd=True, tolerance=1e-6)
+    p, order = model.particles, np.argsort(model.particles.id)
+    assert model.steps > 2
+    np.testing.assert_allclose(p.displacement[order], p.position[order] - start, rtol=0, atol=1e-14)
+
+
 @pytest.mark.parametrize("nmd", [False, True])
 def test_equilibrate_from_zero_in_one_call(nmd):
     """Little soil is left elastic at 87 % of the collapse load."""
