@@ -79,3 +79,11 @@ def test_a_free_wall_stands_or_gives_way(support, tmp_path):
     else:
         # A wedge as a whole goes somewhat faster than one that deforms.
         assert found["acceleration_m_per_s2"] == pytest.approx(expected, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"), [("--cell-size 0.125", True), ("--cell-size 0.125 --motion passive", False), ("", False)]
+)
+def test_cells_too_coarse_for_active_pressures_are_said(options, said, recwarn):
+    importlib.import_module("wall").parse(options.split())
+    assert any("active earth pressures are a quarter too low" in str(one.message) for one in recwarn) == said
