@@ -163,7 +163,7 @@ def raise_pressures(a: Namespace, model: mpm.Model) -> None:
     model.set_pore_pressure(lambda x: WATER * GRAVITY * depth(a, x))
     p.set("stress", -buoyant * depth(a, p.position)[:, None] * np.array([0.5, 1.0, 0.5, 0.0]))
     if a.material == "nor-sand":
-        set_state(a, model, overconsolidation=10.0)  # elastic: else it compacts on its way to equilibrium, and is less loose
+        set_state(a, model, overconsolidation=10.0)  # elastic: it would compact on its way to equilibrium
         model.equilibrate(integration=INTEGRATIONS[a.integration], nmd=a.nmd)
         set_state(a, model)
     else:  # soil at yield: equilibrium of averaged forces takes too many steps, and the start moves it by less than 1 mm

@@ -18,7 +18,7 @@ from ._core import InputError, RunError
 from .checkpoint_file import Arrays, CheckpointFile, Column, write_file
 from .collective import collectively
 from .collisions import set_collisions
-from .contact import require_surfaces, set_contacts
+from .contact import OF_SURFACES, require_surfaces, set_contacts
 from .description import parsed
 from .far_field import require_border
 from .field_contact import set_field_contacts
@@ -169,13 +169,13 @@ def _state(
     None stands for the ranks where each rank owns the cells that the particles of the same rank of the file are in.
     """
     comm, none = model.comm, np.empty(0, np.int64)
-    # Fields that the model has declared, as for contact with friction, and the run had not: they keep their initial value.
+    # Fields of rigid surfaces that the model has had and the run had not: they keep their initial value.
     new = {field["name"] for field in _added_fields(model)} - {field["name"] for field in there["added_fields"]}
     columns = {
         field["name"]: Column(
             field["components"],
             model._core.column(field["name"], none).dtype.kind == "i",
-            field["optional"] or field["name"] in new,
+            field["optional"] or (field["name"] in new and field["name"].startswith(OF_SURFACES)),
         )
         for field in model.particles.schedule()
     }

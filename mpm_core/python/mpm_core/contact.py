@@ -331,9 +331,13 @@ BOND_REACH = 1.5
 """Distance from a surface up to which particles are tied to it, over their radius: the layer beside it"""
 
 
+OF_SURFACES = _SLIP, _BOND = "contact_slip_", "contact_bond_"
+"""Beginnings of the names of the particles' fields that rigid surfaces have"""
+
+
 def bond_name(number: int) -> str:
     """The particles' field that says which of them are tied to a surface."""
-    return f"contact_bond_{number}"
+    return f"{_BOND}{number}"
 
 
 def convert_beside(model: Model, surface: Surface) -> None:
@@ -399,7 +403,7 @@ def set_contacts(model: Model, entries: list[dict[str, Any]]) -> None:
     for number, entry in list(enumerate(entries))[known:]:
         surface, _ = surface_of(model, entry["surface"])._checked(dim)
         bonded = entry["bonded"]
-        slip = f"contact_slip_{number}" if entry["friction"] > 0 or entry["adhesion"] > 0 else ""
+        slip = f"{_SLIP}{number}" if entry["friction"] > 0 or entry["adhesion"] > 0 else ""
         bond = bond_name(number) if bonded else ""
         known_fields = {field["name"] for field in model.particles.schedule()}
         if slip and slip not in known_fields:

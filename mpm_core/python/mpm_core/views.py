@@ -196,6 +196,8 @@ def plot_particles(particles: Particles, name: str, axes: Any, area: np.ndarray)
         axes.autoscale_view()
         axes.set_aspect("equal")
     axes.set(xlabel="x [m]", ylabel="y [m]")
-    place: dict[str, Any] = {"pad": 0.15, "shrink": 0.7} if dim == 3 else {"location": "bottom", "aspect": 40} if wide else {}
+    place: dict[str, Any] = (
+        {"pad": 0.15, "shrink": 0.7} if dim == 3 else {"location": "bottom", "aspect": 40} if wide else {}
+    )
     axes.figure.colorbar(drawn, ax=axes, label=label, **place)
     return axes

@@ -184,5 +184,7 @@ def test_dry_particles_are_refused():
     wet(model)
     elastic = bridge.QuasiStatic(fem.domain, SOIL, fem._facet_tags, [bridge.fixed(BASE)])
     elastic.solve(bridge.Load(unit_weight=1e3))
-    with pytest.raises(mpm.InputError, match="is a QuasiStatic without pore pressures, expected a QuasiStatic with them"):
+    with pytest.raises(
+        mpm.InputError, match="is a QuasiStatic without pore pressures, expected a QuasiStatic with them"
+    ):
         bridge.initialise(model, elastic)
