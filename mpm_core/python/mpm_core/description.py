@@ -184,7 +184,7 @@ _ENTRIES: dict[str, tuple[Any, str]] = {
     "absorbing": (
         AnyOf(
             [_NONE, _SIDES, {**_SIDES, "free_damping": AnyOf([_NONE, (_FREE, _FREE, _FREE)])}]
-        ),  # without in older files
+        ),  # older files have none
         "null, or the sides that absorb waves",
     ),
     "cuts": (_is_count, "a whole number from 0 on"),

@@ -91,7 +91,7 @@ class Model(ContactMethods, Body):
     def restore(self, path: str | os.PathLike[str]) -> None:
         """Restore the state that ``save`` wrote; particles, loads and supports of the model are replaced.
 
-        Its surfaces and added fields are those of the run; fields that the run had not get their initial value.
+        Its surfaces are those of the run; fields of others that the model has get their initial value.
         On the same number of ranks (and partition) the run continues as if it had not been interrupted, to the last bit; on
         another one it differs by the order of sums.
 
