@@ -20,7 +20,7 @@ from common.results import open_results
 from common.slope_case import add_soil_options
 from common.soils import add_law_options, check_law_options, law_of
 from common.summary import write_summary
-from mpm_core.setup_warnings import angles_in_radians
+from mpm_core.law_warnings import angles_in_radians
 
 import mpm_core as mpm
 

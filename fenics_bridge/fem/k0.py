@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from mpm_core.checks import real_numbers
-from mpm_core.setup_warnings import warn_of_radians
+from mpm_core.input_warnings import warn_of_radians
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.errors import InputError

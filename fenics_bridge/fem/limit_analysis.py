@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from mpm_core.setup_warnings import warn_of_radians
+from mpm_core.input_warnings import warn_of_radians
 from numpy.typing import NDArray
 
 from fenics_bridge.errors import InputError

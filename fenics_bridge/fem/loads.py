@@ -12,7 +12,7 @@ import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
-from mpm_core.setup_warnings import UNIT_WEIGHTS, is_unit_weight
+from mpm_core.input_warnings import UNIT_WEIGHTS, is_unit_weight
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat

@@ -6,7 +6,7 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from mpm_core.setup_warnings import angles_in_radians, locking, locks_at_failure
+from mpm_core.law_warnings import angles_in_radians, locking, locks_at_failure
 
 from fenics_bridge import compat
 from fenics_bridge.mesh.tagged import cell_volumes

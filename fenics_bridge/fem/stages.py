@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from mpi4py import MPI
 from mpm_core.checks import renamed
-from mpm_core.setup_warnings import warn_of_water_weight
+from mpm_core.input_warnings import warn_of_water_weight
 
 from fenics_bridge.errors import InputError, agree, is_finite
 from fenics_bridge.fem.k0 import Surface, surface_height

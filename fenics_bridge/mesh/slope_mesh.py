@@ -9,7 +9,7 @@ import numpy as np
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from mpm_core.collective import on_first_rank
-from mpm_core.setup_warnings import warn_of_radians
+from mpm_core.input_warnings import warn_of_radians
 from numpy.typing import NDArray
 
 from fenics_bridge.errors import InputError, is_finite

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import ufl
 from dolfinx import fem
-from mpm_core.setup_warnings import warn_of_rain
+from mpm_core.input_warnings import warn_of_rain
 from numpy.typing import NDArray
 
 from fenics_bridge.errors import agree

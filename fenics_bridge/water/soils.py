@@ -12,8 +12,8 @@ import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from mpm_core.input_warnings import warn_of_water_density
 from mpm_core.retention import curve_values
-from mpm_core.setup_warnings import warn_of_water_density
 from mpm_core.water_checks import LABORATORY_GRAVITY
 from numpy.typing import ArrayLike, NDArray
 

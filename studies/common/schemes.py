@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 
 from mpm_core.integration import LEAST_IN_CELL
-from mpm_core.setup_warnings import dilates, keeps_volume, locks_at_failure
+from mpm_core.law_warnings import dilates, keeps_volume, locks_at_failure
 
 import mpm_core as mpm
 

@@ -35,7 +35,7 @@ from typing import Any
 import numpy as np
 import tomllib
 from mpi4py import MPI
-from mpm_core.setup_warnings import keeps_volume
+from mpm_core.law_warnings import keeps_volume
 
 import fenics_bridge as bridge
 import mpm_core as mpm

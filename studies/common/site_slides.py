@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from mpm_core.law_warnings import keeps_volume
 from mpm_core.output import ModelOutput
-from mpm_core.setup_warnings import keeps_volume
 
 import fenics_bridge as bridge
 import mpm_core as mpm

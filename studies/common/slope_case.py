@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
+from mpm_core.input_warnings import in_radians
+from mpm_core.law_warnings import angles_in_radians
 from mpm_core.probes import nearest_particle
-from mpm_core.setup_warnings import angles_in_radians, in_radians
 
 import fenics_bridge as bridge
 import mpm_core as mpm

@@ -14,10 +14,10 @@ from ._core import InputError
 from .checks import flag, positive, within
 from .collective import collectively
 from .collisions import add_collision
+from .input_warnings import warn_of_friction
 from .mesh import floats
 from .outlines import Outline, mesh_box, outline
 from .rigid_body import FreeBody, Servo, Velocity, describe, rigid_body
-from .setup_warnings import warn_of_friction
 from .surfaces import KINDS, Surface, distances
 from .triangles import Triangles
 

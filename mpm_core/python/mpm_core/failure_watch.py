@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._core import Integration
 from .integration import integration_of
-from .setup_warnings import locks_at_failure
+from .law_warnings import locks_at_failure
 
 if TYPE_CHECKING:
     from .model import Model

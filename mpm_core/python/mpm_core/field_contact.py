@@ -12,8 +12,8 @@ from ._core import InputError
 from .checks import positive
 from .collective import collectively
 from .contact import checked, described, surface_of
+from .input_warnings import warn_of_friction
 from .mesh import floats
-from .setup_warnings import warn_of_friction
 from .surfaces import KINDS, Plane, Surface
 from .triangles import Triangles
 

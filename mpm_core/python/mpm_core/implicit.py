@@ -16,11 +16,11 @@ from .energy import ADVICE, LEAST_STEPS, EnergyWatch
 from .explicit import is_report_due
 from .failure_watch import FailureWatch
 from .ghost import GhostPenalty
+from .law_warnings import dilates
 from .load_watch import LoadWatch
 from .partition import keep_balance
 from .rayleigh import Rayleigh, implicit_mass_damping
 from .report import ImplicitReport
-from .setup_warnings import dilates
 from .solution import Solution
 from .space import swollen
 from .step_control import StepControl

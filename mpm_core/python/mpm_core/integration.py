@@ -11,8 +11,8 @@ import numpy as np
 from . import _core
 from ._core import Integration
 from .checks import member
+from .law_warnings import with_inner_laws
 from .resting import represented
-from .setup_warnings import with_inner_laws
 
 if TYPE_CHECKING:
     from .model import Model

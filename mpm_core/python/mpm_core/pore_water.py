@@ -15,11 +15,11 @@ from .anisotropy import tensors_of_laws
 from .checks import real_numbers
 from .collective import collectively
 from .conditions import Conditions
+from .input_warnings import warn_of_rain, warn_of_water_density
 from .mesh import Tag, floats
 from .parameter_fields import Field
 from .particles import Particles
 from .retention import curves_of_laws, joined
-from .setup_warnings import warn_of_rain, warn_of_water_density
 from .water_checks import density_of_water, require_pores, require_soil
 
 History: TypeAlias = list[tuple[float, float]]
