@@ -32,7 +32,6 @@ from ._core import (
 from ._core import compiler as compiler
 from ._core import version as __version__
 from .checkpoint import checkpoint_description
-from .contact import RigidContact
 from .critical_cell import CriticalCell, critical_cell
 from .element import ElementTest
 from .energy import EnergyWarning
@@ -53,6 +52,7 @@ from .report import ImplicitReport, Report
 from .reports import Reports
 from .resting import Conversion
 from .rigid_body import FreeBody, Servo
+from .rigid_contact import RigidContact
 from .space import Space, parts, space
 from .surfaces import Box, Cone, Cylinder, Disc, Plane, Polyline, Sphere, Wedge, distances
 from .triangles import Triangles

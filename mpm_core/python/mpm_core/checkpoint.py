@@ -18,13 +18,14 @@ from ._core import InputError, RunError
 from .checkpoint_file import Arrays, CheckpointFile, Column, write_file
 from .collective import collectively
 from .collisions import set_collisions
-from .contact import OF_SURFACES, require_surfaces, set_contacts
+from .contact import OF_SURFACES, set_contacts
 from .description import parsed
 from .far_field import require_border
 from .field_contact import set_field_contacts
 from .fingerprint import fingerprint, mesh_fingerprint
 from .rows import find_items
 from .step_control import StepControl
+from .surface_description import require_surfaces
 from .water_entry import take_water, water_entry
 
 if TYPE_CHECKING:

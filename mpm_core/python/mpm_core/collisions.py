@@ -10,8 +10,8 @@ from .checks import positive, within
 from .collective import collectively
 
 if TYPE_CHECKING:
-    from .contact import RigidContact
     from .model import Model
+    from .rigid_contact import RigidContact
 
 _BALLS = ("Disc", "Sphere")
 

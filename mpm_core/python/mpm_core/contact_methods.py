@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any, cast
 
 from numpy.typing import ArrayLike
 
-from .contact import RigidContact, add_contact, smallest_gap
+from .contact import add_contact, smallest_gap
 from .field_contact import FieldContact, add_field_contact
 from .rigid_body import FreeBody, Servo, Velocity
+from .rigid_contact import RigidContact
 from .surfaces import Surface
 
 if TYPE_CHECKING:

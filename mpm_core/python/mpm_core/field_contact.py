@@ -11,9 +11,9 @@ from . import _core
 from ._core import InputError
 from .checks import positive
 from .collective import collectively
-from .contact import checked, described, surface_of
 from .input_warnings import warn_of_friction
 from .mesh import floats
+from .surface_description import checked, described, surface_of
 from .surfaces import KINDS, Plane, Surface
 from .triangles import Triangles
 

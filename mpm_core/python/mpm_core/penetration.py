@@ -5,8 +5,8 @@ from __future__ import annotations
 import warnings
 from typing import TYPE_CHECKING
 
-from .contact import surface_of
 from .mesh import cell_sizes
+from .surface_description import surface_of
 
 if TYPE_CHECKING:
     from .model import Model

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._core import Geometry, InputError
 from .collective import collectively
-from .contact import checked
 from .mesh import floats
 from .outlines import mesh_box, outline
+from .surface_description import checked
 from .surfaces import Surface, distances
 
 if TYPE_CHECKING:
