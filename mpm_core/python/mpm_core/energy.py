@@ -15,6 +15,9 @@ WARN_ABOVE = 0.01
 NOISE_ABOVE = 0.1
 """Fraction of the energy at work in motion of the particles against their nodes above which there is a warning"""
 
+PIC_ABOVE = 0.1
+"""Fraction of the energy at work that a PIC fraction has dissipated above which there is a warning, where soil flows"""
+
 LEAST_STEPS = 32
 """Steps of a model before its energy is checked: in the first explicit steps half a time step is a large part of it"""
 
@@ -45,6 +48,7 @@ class EnergyWatch:
         advice: what its text ends with, of energy that was generated (True) or dissipated; called on all ranks alike.
         least_steps: steps of a model before its energy is checked.
         noisy: leave out the warning of motion against the nodes, as where particles do not cross cells, or have no such motion.
+        damped: leave out the warning of dissipation by a PIC fraction, as where there is none.
     """
 
     limit: float | None
@@ -53,13 +57,14 @@ class EnergyWatch:
     least_steps: int = LEAST_STEPS
     warned: float = WARN_ABOVE
     noisy: bool = False
+    damped: bool = False
     largest: float = 0.0  # of the energies at work so far: a body that swings back has little of it
 
     def look(self, report: Report) -> None:
         """Warn when the unexplained part has passed 1 %, and again each time it has grown tenfold.
 
         Warn once, too, when motion of the particles relative to their nodes has more than a tenth of the energy and a third of
-        the kinetic energy.
+        the kinetic energy, and when a PIC fraction has dissipated more than a tenth of the energy of soil that flows.
 
         Args:
             report: the state of the run.
@@ -84,6 +89,11 @@ class EnergyWatch:
             self.noisy = True
             if self.speaks:
                 warnings.warn(_noise(report, self.largest), EnergyWarning, stacklevel=4)
+        flows = report.plastic_work > PIC_ABOVE * self.largest  # soil that comes to rest under its weight may be damped
+        if not self.damped and flows and report.pic_loss > PIC_ABOVE * self.largest:
+            self.damped = True
+            if self.speaks:
+                warnings.warn(_damping(report, self.largest), EnergyWarning, stacklevel=4)
 
 
 def _against_nodes(report: Report) -> float:
@@ -102,6 +112,14 @@ def _noise(report: Report, energy: float) -> str:
         f"at t = {report.time:.6g} s {fraction:.3g} % of the energy at work is motion of the particles against their nodes, "
         "which the noise of cell crossings excites. A body in tension or bending then sags and does not give its strain energy "
         "back: use moving_cells=True, with which no particle crosses, or more particles per cell (24 in triangles; docs/integration.md)"
+    )
+
+
+def _damping(report: Report, energy: float) -> str:
+    return (
+        f"at t = {report.time:.6g} s the PIC fraction has dissipated {100 * report.pic_loss / energy:.3g} % of the energy at work, as a "
+        "viscosity of the soil would, which shortens run-outs, more in stiff or undrained soil, whose critical steps are short: try a "
+        "fraction (pic) of a tenth of it"
     )
 
 

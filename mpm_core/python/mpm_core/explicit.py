@@ -128,7 +128,13 @@ def run_explicit(
     pauses = 1 if watch is not None or rebalance < np.inf else max(1, 2_000_000 // most // _core.control_interval)
     advice = ADVICE_FOR.get(options.integration, ADVICE)
     smooth = options.moving_cells or options.transfer == Transfer.AFFINE  # particles have no motion against their nodes
-    energy = EnergyWatch(energy_limit, model.comm.rank == 0, lambda generated: swollen(model) or advice, noisy=smooth)
+    energy = EnergyWatch(
+        energy_limit,
+        model.comm.rank == 0,
+        lambda generated: swollen(model) or advice,
+        noisy=smooth,
+        damped=run.pic == 0,
+    )
     failure = FailureWatch(model, options)
     penetration, loads = PenetrationWatch(model), LoadWatch(model)
     if model._space_watch is None:

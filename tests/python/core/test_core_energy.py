@@ -262,6 +262,30 @@ def test_a_beam_that_sags_by_the_noise_of_cell_crossings_is_named(per_cell, nois
     assert any("against their nodes" in str(w.message) for w in caught) == noisy
 
 
+@pytest.mark.parametrize(("pic", "said"), [(0.1, True), (1e-3, False)])
+def test_a_pic_fraction_that_brakes_soil_that_flows_is_named(pic, said):
+    # The step of this stiff clay is short, so that a fraction that is small for each step is large for the time in which it flows.
+    model = failing_block(mpm.tresca(young=20e6, poisson=0.45, shear_strength=1e3))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", mpm.EnergyWarning)
+        report = run(model, 0.5, every=0.05, pic=pic, **NMD, **MIXED)
+    assert report.plastic_work > 0.2 * report.energy_scale
+    assert (report.pic_loss > 0.1 * report.energy_scale) == said
+    assert sum("PIC fraction has dissipated" in str(w.message) for w in caught) == said
+
+
+def test_a_pic_fraction_that_brings_elastic_soil_to_rest_is_not_named():
+    model = mpm.Model(box([4, 4]), ELASTIC)
+    model.seed(density=DENSITY, per_cell=6)
+    model.fix(3)
+    model.set_gravity((0.0, -9.81))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", mpm.EnergyWarning)
+        report = run(model, 2.0, every=0.1, pic=0.2, energy_limit=None)
+    assert report.pic_loss > 0.1 * report.energy_scale
+    assert not any("PIC fraction" in str(w.message) for w in caught)
+
+
 def test_unexplained_energy_is_compared_with_the_largest_energy_so_far():
     # A body that has swung back has hardly any energy at work: 1 J of 2 J is not an error if 1000 J were at work before.
     model = mpm.Model(box([2, 2]), mpm.LinearElastic(young=1e6, poisson=0.3))
