@@ -69,8 +69,8 @@ def parser() -> ArgumentParser:
     add_number(
         p, "--disturbed-loss", 0.9, "-", "fraction of its strength that the disturbed clay has lost", above=0, at_most=1
     )
-    add_number(p, "--damping", 0.05, "-", "local damping", at_least=0, below=1)
-    add_pic(p, 0.1)
+    add_number(p, "--damping", 0.01, "-", "local damping", at_least=0, below=1)
+    add_pic(p, 0.002)
     add_number(p, "--time", 60.0, "s", "longest duration of the slide", above=0)
     add_count(p, "--frames", 100, "times at which particles are drawn")
     add_picture_options(p)
