@@ -2,8 +2,8 @@
 
 The site is a TOML file (`meshes/embankment.toml` unless another is given): a mesh of gmsh, soils with their laws by the names
 of its physical groups, supports by boundary, and a list of stages. Finite elements and quasi-static particles compute the
-same stages. Then the strength of all soils is divided by --factor, and the explicit scheme computes the failure; if a stage
-has no equilibrium, its failure is computed without reduction of the strength.
+same stages; with --nmd linear elements, too, average strains. Then the strength of all soils is divided by --factor, and the
+explicit scheme computes the failure; if a stage has no equilibrium, its failure is computed without reduction of the strength.
 """
 
 from __future__ import annotations
@@ -57,12 +57,7 @@ def parser() -> ArgumentParser:
 
 def build(site: Site, per_cell: int, factor: float, nmd: bool) -> tuple[bridge.ParticleSite, str | None]:
     """Particles after all stages, and why they ended early if they did; weaker laws are there for the slide. Collective."""
-    weaker = (
-        [bridge.reduced_strength(law, factor) for law in [*site.laws.values(), *site.further_laws]]
-        if factor > 1
-        else []
-    )
-    model, materials = site.model(weaker)
+    model, materials = site.model(site.weaker_laws(factor) if factor > 1 else ())
     particles = bridge.ParticleSite(
         model, materials, site.supports, per_cell=per_cell, small_displacements=True, nmd=nmd
     )
@@ -104,11 +99,10 @@ def main(arguments: list[str] | None = None) -> int:
     start = perf_counter()
     folder = open_results(a, comm)
     site = read_site(a.site, comm, a.cell_size)
-    staged, rows, pictures, failed = carry_out(site, int(a.elements[1]), folder, comm)
+    degree, averaged = int(a.elements[1]), site_slides.averages(a, site.laws.values())
+    staged, rows, pictures, failed = carry_out(site, degree, folder, comm, nmd=averaged and degree == 1)
     built = perf_counter()
-    particles, failed_particles = build(
-        site, a.particles_per_cell, a.factor, site_slides.averages(a, site.laws.values())
-    )
+    particles, failed_particles = build(site, a.particles_per_cell, a.factor, averaged)
     apart = stress_difference(particles, staged) if not (failed or failed_particles) else None
     model = particles.model
     model.particles.set("initial_position", model.particles.position)

@@ -120,6 +120,11 @@ class Site:
         model.set_gravity([0.0] * (mesh.dim - 1) + [-GRAVITY])
         return model
 
+    def weaker_laws(self, factor: float) -> list[Any]:
+        """All laws, those of stages last, with their strength divided by a factor; elastic soil beside others stays as it is."""
+        laws = dict(enumerate([*self.laws.values(), *self.further_laws]))
+        return list(bridge.reduced_strength(laws, factor).values())
+
     def left_out_at_once(self) -> str:
         """A warning of what stages change beside placing soils, for a study that has all soils at once; else no text."""
         found = []

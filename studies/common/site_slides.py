@@ -176,8 +176,7 @@ def site_slide(a: Namespace) -> int:
         reason = next(step.report.reason for step in reversed(steps) if not step.converged)
         carried = max((step.value for step in steps if step.converged), default=0.0)
         raise mpm.InputError(f"{a.site}: its soils carry {carried:.1%} of their weight only: {reason}")
-    weaker = [bridge.reduced_strength(law, a.factor) for law in site.laws.values()]
-    model = site.particles(a.particles_per_cell, more=weaker)
+    model = site.particles(a.particles_per_cell, more=site.weaker_laws(a.factor))
     handover = bridge.initialise(model, fem, count_displacement=False, nmd=nmd)
     model.assign(model.particles.material + len(site.laws))
     with Interrupt(comm) as interrupt:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -23,10 +24,14 @@ def add_stage_options(parser: ArgumentParser, site: str, elements: str) -> None:
 
 
 def carry_out(
-    site: Site, degree: int, folder: Path, comm: MPI.Comm
+    site: Site, degree: int, folder: Path, comm: MPI.Comm, **options: Any
 ) -> tuple[bridge.FemSite, list[dict], list, str | None]:
-    """Carry out all stages; returns the site, a row and a picture for each stage, and the reason of an early end. Collective."""
-    staged, rows, pictures, stopped = bridge.FemSite(site.finite_elements(degree)), [], [], None
+    """Carry out all stages; returns the site, a row and a picture for each stage, and the reason of an early end. Collective.
+
+    Args:
+        options: of `Site.finite_elements`.
+    """
+    staged, rows, pictures, stopped = bridge.FemSite(site.finite_elements(degree, **options)), [], [], None
     with StageFiles(staged, folder / "stages", comm) as files:
         for stage in site.stages:
             try:

@@ -244,3 +244,36 @@ def test_a_site_that_does_not_carry_its_weight_does_not_slide(tmp_path):
         mpm.InputError, match=r"site.toml: its soils carry [2-6]\d.\d% of their weight only: .*mechanism"
     ):
         importlib.import_module("slope").main(["--site", str(path), "--output", str(tmp_path / "results")])
+
+
+def test_elastic_soil_of_a_site_stays_as_it_is_when_strength_is_reduced(tmp_path):
+    elastic = 'material = "elastic"\nyoung = 5e6\npoisson = 0.25'
+    lines = (
+        'material = "tresca"\nyoung = 5e6\npoisson = 0.45\nshear_strength = {value = 20e3, per_metre = 10e3, top = 2.0}'
+    )
+    site = site_file.read_site(site_in(tmp_path, SITE.replace(lines, elastic)), MPI.COMM_WORLD)
+    lower, upper = site.weaker_laws(1.5)
+    assert isinstance(lower, mpm.LinearElastic) and lower.young == 5e6
+    assert upper.cohesion == pytest.approx(9e3 / 1.5)
+    folder = tmp_path / "results"
+    options = f"--site {tmp_path / 'site.toml'} --factor 1.2 --time 0.01 --frames 1 --particles-per-cell 3 --no-pictures --output {folder}"
+    assert importlib.import_module("slope").main(options.split()) == 0
+
+
+@pytest.mark.parametrize("nmd", ["--nmd", "--no-nmd"])
+def test_stages_of_the_embankment_average_strains_in_elements_as_in_particles(tmp_path, nmd):
+    """Sand on soil ten times as stiff, where averages change stresses by more than the largest of them; elements and particles agree."""
+    stages = '[[stages]]\nname = "ground"\nfill = "lower"\n[[stages]]\nname = "sand"\nfill = "upper"\n'
+    sand = SITE.replace("shear_strength = {value = 20e3, per_metre = 10e3, top = 2.0}", "cohesion = 1e6")
+    sand = sand.replace("friction_angle = 0.0\nyoung = 5e6", "friction_angle = 30.0\nyoung = 5e5").replace(
+        "9e3", "36e3"
+    )
+    path, folder = (
+        site_in(tmp_path, sand.replace('material = "tresca"', "friction_angle = 30.0") + stages),
+        tmp_path / "results",
+    )
+    options = (
+        f"--site {path} --factor 1 --time 0.01 --frames 1 --particles-per-cell 3 --no-pictures {nmd} --output {folder}"
+    )
+    assert importlib.import_module("embankment").main(options.split()) == 0
+    assert json.loads((folder / "summary.json").read_text())["stress_difference_of_particles_to_fem"] < 1e-4
