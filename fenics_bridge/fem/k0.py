@@ -122,8 +122,10 @@ def surface_height(surface: Surface, points: NDArray[np.float64]) -> NDArray[np.
     line = _finite_heights(surface)
     if line.ndim == 0:
         return np.full(len(points), float(line))
-    if line.ndim != 2 or line.shape[1] != 2 or np.any(np.diff(line[:, 0]) < 0):
-        raise InputError(f"surface has shape {line.shape}, expected (k, 2) points with x rising")
+    if line.ndim != 2 or line.shape[1] != 2 or len(line) == 0:
+        raise InputError(f"surface has shape {line.shape}, expected (k, 2) points (x, y) with x rising")
+    if np.any(np.diff(line[:, 0]) < 0):
+        raise InputError(f"surface has points at x = {line[:, 0].tolist()} m, expected x that rises")
     return np.interp(points[:, 0], line[:, 0], line[:, 1])
 
 

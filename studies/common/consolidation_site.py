@@ -32,7 +32,7 @@ from fenics_bridge import water
 from fenics_bridge.water.boundary import value_at
 
 from .consolidation_stages import GroundStage, Table, pressure_table, stages_of
-from .site_file import law_at, read_toml, supports_of
+from .site_file import law_at, read_toml, supports_of, unit_weight_of
 from .slope_case import GRAVITY
 from .water_site import DAY, condition, corners_of, directions_of, porous_soil, times_of, vertical_conductivity
 
@@ -214,9 +214,7 @@ def read_consolidation_site(
     laws, soils, weights = {}, {}, {}
     for name, given in table["soils"].items():
         where = f"{path}: soils.{name}"
-        if "unit_weight" not in given:
-            raise mpm.InputError(f"{where} has no unit_weight [N/m3]")
-        weights[name] = float(given["unit_weight"])
+        weights[name] = unit_weight_of(given, where)
         porous = {key: given[key] for key in POROUS if key in given}
         soils[name] = porous_soil(porous, where) if porous else None
         laws[name] = law_at({k: v for k, v in given.items() if k not in (*POROUS, "unit_weight")}, 0.0, where)

@@ -27,6 +27,7 @@ Example of a file:
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -181,9 +182,7 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
     soils, laws, weights = table["soils"], {}, {}
     for soil, given in soils.items():
         where = f"{path}: soils.{soil}"
-        if "unit_weight" not in given:
-            raise mpm.InputError(f"{where} has no unit_weight [N/m3]")
-        weights[soil] = float(given["unit_weight"])
+        weights[soil] = unit_weight_of(given, where)
         parameters = _located({key: value for key, value in given.items() if key != "unit_weight"}, path)
         if any(isinstance(value, dict) for value in parameters.values()):
             cell_tags, heights = bridge.graded_tags(
@@ -201,6 +200,20 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
                 list(others.values()), axisymmetric)  # fmt: skip
     site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(table.get("stages", []))]
     return site
+
+
+def unit_weight_of(soil: dict, where: str) -> float:
+    """Unit weight [N/m3] in the table of a soil; where: it stands, for messages."""
+    if "unit_weight" not in soil:
+        raise mpm.InputError(f"{where} has no unit_weight [N/m3]")
+    if not is_number(soil["unit_weight"]):
+        raise mpm.InputError(f"{where}: unit_weight is {soil['unit_weight']!r}, expected a number [N/m3]")
+    return float(soil["unit_weight"])
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value of a site's file is a finite number."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def site_mesh(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None) -> tuple[Any, Any, Any]:
@@ -244,7 +257,7 @@ def _at_height(name: str, value: Any, height: float) -> Any:
     """A parameter as it is, or its value at a height: value + per_metre * (top - height)."""
     if not isinstance(value, dict):
         return value
-    if set(value) != {"value", "per_metre", "top"}:
+    if set(value) != {"value", "per_metre", "top"} or not all(map(is_number, value.values())):
         raise ValueError(
             f"{name} is {value}, expected {{value = , per_metre = , top = }}: it grows with depth below top [m]"
         )
@@ -306,6 +319,12 @@ def _stage(given: dict, number: int, site: Site, laws: dict[str, Any], path: Pat
     for key in given:
         if key not in STAGE_KEYS:
             raise mpm.InputError(f"{where}: unknown key {key!r}, expected some of {', '.join(STAGE_KEYS)}")
+    for key in ("law", "unit_weight", "pressure", "support"):
+        if not isinstance(given.get(key, {}), dict):
+            raise mpm.InputError(f"{where}: {key} is {given[key]!r}, expected a table such as {key} = {{name = value}}")
+    reset = given.get("reset_displacement", False)
+    if not isinstance(reset, bool):
+        raise mpm.InputError(f"{where}: reset_displacement is {reset!r}, expected true or false")
     fill = given.get("fill", [])
     fill = [fill] if isinstance(fill, str) else fill
     for soil in [*fill, *given.get("law", {})]:
@@ -316,7 +335,6 @@ def _stage(given: dict, number: int, site: Site, laws: dict[str, Any], path: Pat
             raise mpm.InputError(
                 f"{where}: law of {soil!r} is {law!r}, expected one of [laws]: {', '.join(laws) or 'there is none'}"
             )
-    level = given.get("water_level")
     return bridge.Stage(
         str(given.get("name", f"stage {number + 1}")),
         fill=fill,
@@ -327,6 +345,19 @@ def _stage(given: dict, number: int, site: Site, laws: dict[str, Any], path: Pat
         support=[_support(name, kind, f"{where}.support.{name}", site.domain, site.facet_tags)
                  for name, kind in given.get("support", {}).items()],
         release=given.get("release", ()),
-        pore_pressure=None if level is None else bridge.hydrostatic(np.asarray(level, dtype=float)),
-        reset_displacement=bool(given.get("reset_displacement", False)),
+        pore_pressure=_water(given["water_level"], where) if "water_level" in given else None,
+        reset_displacement=reset,
     )  # fmt: skip
+
+
+def _water(level: Any, where: str) -> Any:
+    """Pore pressures below a water level: a number, or points (x, level) of its surface."""
+    points = level if isinstance(level, list) else [[0.0, level]]
+    good = points and all(
+        isinstance(point, list) and len(point) == 2 and all(map(is_number, point)) for point in points
+    )
+    if not good or any(after[0] < before[0] for before, after in zip(points, points[1:])):
+        raise mpm.InputError(
+            f"{where}: water_level is {level!r}, expected a number [m] or points [x, level] with x rising"
+        )
+    return bridge.hydrostatic(np.array(level, dtype=float))

@@ -107,6 +107,13 @@ def test_a_site_may_be_a_half_section(tmp_path):
         ("cell_size = 0.5", 'cell_size = 0.5\nstages = [{fill = ["sand"]}]', "soil 'sand' is not among the soils lower, upper"),
         ("cell_size = 0.5", "cell_size = 0.5\nstages = [{full = []}]", r"stages\[0\]: unknown key 'full'"),
         ("cell_size = 0.5", "cell_size = [", "is not TOML"),
+        ("unit_weight = 18e3", 'unit_weight = "18e3"', r"soils.upper: unit_weight is '18e3', expected a number \[N/m3\]"),
+        ("per_metre = 10e3", 'per_metre = "10e3"', "soils.lower: shear_strength is .* expected {value = , per_metre = , top = }"),
+        ("cell_size = 0.5", 'cell_size = 0.5\nstages = [{reset_displacement = "false"}]', "reset_displacement is 'false', expected true"),
+        ("cell_size = 0.5", 'cell_size = 0.5\nstages = [{water_level = "low"}]', "water_level is 'low', expected a number"),
+        ("cell_size = 0.5", "cell_size = 0.5\nstages = [{water_level = [[3, 1], [0, 1]]}]", r"water_level is \[.* with x rising"),
+        ("cell_size = 0.5", 'cell_size = 0.5\nstages = [{support = ["left"]}]', r"support is \['left'\], expected a table such as"),
+        ("cell_size = 0.5", "cell_size = 0.5\nstages = [{unit_weight = 5e3}]", "unit_weight is 5000.0, expected a table such as"),
     ],
 )  # fmt: skip
 def test_a_mistake_in_the_file_is_named(tmp_path, old, new, message):
