@@ -114,23 +114,23 @@ def _checked_layers(layers: Any) -> Any:
     return bottoms, unit_weights, ratios
 
 
-def surface_height(surface: Surface, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Height of the ground above each point: (n,) [m]; `surface` as in `k0_stress`."""
+def surface_height(surface: Surface, points: NDArray[np.float64], name: str = "surface") -> NDArray[np.float64]:
+    """Height of the ground above each point: (n,) [m]; `surface` as in `k0_stress`, called `name` in messages."""
     if callable(surface):
         height = surface(points[:, 0] if points.shape[1] == 2 else points[:, :-1])
-        return np.broadcast_to(_finite_heights(height), (len(points),))
-    line = _finite_heights(surface)
+        return np.broadcast_to(_finite_heights(name, height), (len(points),))
+    line = _finite_heights(name, surface)
     if line.ndim == 0:
         return np.full(len(points), float(line))
     if line.ndim != 2 or line.shape[1] != 2 or len(line) == 0:
-        raise InputError(f"surface has shape {line.shape}, expected (k, 2) points (x, y) with x rising")
+        raise InputError(f"{name} has shape {line.shape}, expected (k, 2) points (x, y) with x rising")
     if np.any(np.diff(line[:, 0]) < 0):
-        raise InputError(f"surface has points at x = {line[:, 0].tolist()} m, expected x that rises")
+        raise InputError(f"{name} has points at x = {line[:, 0].tolist()} m, expected x that rises")
     return np.interp(points[:, 0], line[:, 0], line[:, 1])
 
 
-def _finite_heights(heights: Any) -> NDArray[np.float64]:
-    line = real_numbers("surface", heights)
+def _finite_heights(name: str, heights: Any) -> NDArray[np.float64]:
+    line = real_numbers(name, heights)
     if not np.isfinite(line).all():
-        raise InputError(f"surface has heights of {line[~np.isfinite(line)][0]} m, expected finite numbers")
+        raise InputError(f"{name} has heights of {line[~np.isfinite(line)][0]} m, expected finite numbers")
     return line

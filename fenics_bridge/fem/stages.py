@@ -110,12 +110,14 @@ def hydrostatic(level: Surface, unit_weight: float = 9.81e3) -> OfPosition:
         Function of positions (n, D) [m] that returns pore pressures (n,) [Pa].
 
     Raises:
-        InputError: unit_weight is negative or not finite.
+        InputError: unit_weight is negative or not finite, or level of another shape.
     """
+    if not callable(level):
+        surface_height(level, np.zeros((0, 2)), "level")
     if not (is_finite(unit_weight) and unit_weight >= 0):
         raise InputError(f"unit_weight is {unit_weight!r} N/m3, expected a number from 0 on")
     warn_of_water_weight(MPI.COMM_WORLD, unit_weight)
-    return lambda x: unit_weight * np.maximum(surface_height(level, x) - x[:, -1], 0.0)
+    return lambda x: unit_weight * np.maximum(surface_height(level, x, "level") - x[:, -1], 0.0)
 
 
 def carry_out(site: FemSite | ParticleSite, stages: Iterable[Stage]) -> Iterator[StageReport]:
