@@ -344,6 +344,11 @@ class QuasiStatic(SupportedBody, PointFunctions):
         nodal = np.zeros(0) if self._water is None else self._water.x.array
         return max(self.domain.comm.allgather(float(nodal.max(initial=0.0))))
 
+    def largest_suction(self) -> float:
+        """Largest suction at a node [Pa], as far as it acts on the soil; 0 without any. Collective."""
+        nodal = np.zeros(0) if self._water is None else self._water.x.array
+        return max(self.domain.comm.allgather(float((-nodal).max(initial=0.0))))
+
     def stress_function(self, smooth: bool = False) -> fem.Function:
         """The stress as a function. Collective.
 

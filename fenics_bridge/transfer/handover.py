@@ -25,6 +25,7 @@ from fenics_bridge.transfer.dried import balance_dried_soil
 from fenics_bridge.transfer.moved import cell_gradient, fitted_volumes, held_volumes, volume_change
 from fenics_bridge.transfer.pore_pressures import (
     add_to_stress,
+    prescribed_mistake,
     set_pore_pressure,
     skeleton_of,
     stands_on_surface,
@@ -101,7 +102,7 @@ def initialise(
         model: model with particles.
         fem: finite elements, solved and converged; the meshes and their partitions may differ. Particles with pore water
             (`Model.add_water`) take their pore pressures too, from a `water.Consolidation` or from a `QuasiStatic` with prescribed
-            ones, and `equilibrate` keeps these. Particles of `Undrained` laws, whose skeletons are the laws of a `QuasiStatic`
+            ones (without suction where they have retention curves), and `equilibrate` keeps these. Particles of `Undrained` laws, whose skeletons are the laws of a `QuasiStatic`
             with prescribed pore pressures, take total stresses, and the pressures as their `excess_pore_pressure`.
         count_displacement: let displacements of particles include those of the finite elements; otherwise they start from zero.
         move: move particles with the body, by its displacement; otherwise they stay where they are, with their volume.
@@ -241,7 +242,7 @@ def _require_usable(
         if model.comm.allreduce(len(model.particles))
         else "model has no particles, expected some: seed them before",
     )
-    agree(model.comm, _water_mistake(model, fem))
+    agree(model.comm, _water_mistake(model, fem) or prescribed_mistake(model, fem))
     agree(model.comm, _not_equilibrated(model, integration) if equilibrate else None)
     agree(model.comm, _rising_gravity(model))
     known = not move or hasattr(model.mesh, "domain")

@@ -42,6 +42,33 @@ def takes_pore_pressure(model: mpm.Model, fem: Any) -> bool:
     )
 
 
+def prescribed_mistake(model: mpm.Model, fem: Any) -> str | None:
+    """Why particles cannot take the pore pressures that are prescribed to finite elements, in words; None if they can. Collective."""
+    if not isinstance(fem, QuasiStatic) or fem._water is None:
+        return None
+    water = model._core.water
+    if water is not None and water.may_dry and fem.largest_suction() > 1e-9 * fem.largest_pore_pressure():
+        return (
+            f"fem is a QuasiStatic with suction of up to {fem.largest_suction():.4g} Pa that acts on the soil, expected none or a "
+            "water.Consolidation, since particles have retention curves, by which suction acts in part only and water is missing"
+        )
+    used = {
+        number for numbers in model.comm.allgather(np.unique(model.particles.material).tolist()) for number in numbers
+    }
+    undrained = {number for number in used if isinstance(model.laws[number], mpm.Undrained)}
+    if (
+        water is None
+        and undrained
+        and undrained != used
+        and not any(isinstance(law, mpm.Undrained) for law in fem.laws)
+    ):
+        return (
+            f"the laws of materials {sorted(undrained)} are Undrained and those of {sorted(used - undrained)} are not, expected "
+            "all or none: particles take the pore pressures of fem as parts of total stresses, or not at all"
+        )
+    return None
+
+
 def set_pore_pressure(model: mpm.Model, fem: QuasiStatic, search: PointSearch) -> None:
     """Give pore water of particles the pressures of the finite elements. Collective."""
     model.particles.set("pore_pressure", search.values(fem._water)[:, 0])

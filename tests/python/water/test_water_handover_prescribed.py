@@ -154,3 +154,29 @@ def test_seepage_through_a_bank_leads_to_particles_at_rest():
     model = particles(background, UNDRAINED)
     result, said = handed_over(model, fem)
     assert result.unbalanced_ratio < 1e-9 and said == []
+
+
+def test_suction_that_is_prescribed_is_refused_where_particles_may_dry(seeping):
+    """It would be taken for the whole suction, while prescribed pressures act as they are: S_e p would act, and water be missing."""
+    model = particles(seeping[1], SOIL)
+    model.add_water(
+        porosity=0.4, conductivity=1e-9, retention=water.VanGenuchten(alpha=1e-4, n=2.0), drained_surface=True
+    )
+    with pytest.raises(mpm.InputError, match="fem is a QuasiStatic with suction of up to .* have retention curves"):
+        bridge.initialise(model, seeping[0])
+    fem, background = bank(lambda x: np.maximum(below_two_metres(x), 0.0))
+    model = particles(background, SOIL)
+    model.add_water(
+        porosity=0.4, conductivity=1e-9, retention=water.VanGenuchten(alpha=1e-4, n=2.0), drained_surface=True
+    )
+    assert bridge.initialise(model, fem, equilibrate=False).unbalanced_ratio < 1e-9
+
+
+def test_particles_of_which_some_are_undrained_are_refused(seeping):
+    fem, background = seeping
+    model = particles(background, [UNDRAINED, SOIL])
+    model.assign((model.particles.position[:, 1] > 2.0).astype(int))
+    with pytest.raises(
+        mpm.InputError, match=r"materials \[0\] are Undrained and those of \[1\] are not, expected all or none"
+    ):
+        bridge.initialise(model, fem)
