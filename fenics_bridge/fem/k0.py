@@ -118,7 +118,10 @@ def surface_height(surface: Surface, points: NDArray[np.float64], name: str = "s
     """Height of the ground above each point: (n,) [m]; `surface` as in `k0_stress`, called `name` in messages."""
     if callable(surface):
         height = surface(points[:, 0] if points.shape[1] == 2 else points[:, :-1])
-        return np.broadcast_to(_finite_heights(name, height), (len(points),))
+        heights = _finite_heights(name, height)
+        if heights.shape not in ((), (len(points),)):
+            raise InputError(f"{name} gives heights of shape {heights.shape}, expected ({len(points)},)")
+        return np.broadcast_to(heights, (len(points),))
     line = _finite_heights(name, surface)
     if line.ndim == 0:
         return np.full(len(points), float(line))

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_bridge.errors import agree, real_numbers
+from fenics_bridge.errors import agree
+from fenics_bridge.fem.active_cells import pressures_at
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.water.seepage import Seepage
@@ -45,7 +46,7 @@ def _pressures(model: Any, pore_pressure: Any) -> Any:
         return None
     x = model._pressures[0].tabulate_dof_coordinates()[:, : model.domain.geometry.dim]
     if not isinstance(pore_pressure, Seepage):
-        return np.broadcast_to(real_numbers(model.domain.comm, "pore_pressure", pore_pressure(x)), len(x))
+        return pressures_at(model.domain.comm, pore_pressure, x)
     search = PointSearch(pore_pressure.domain, x)
     search.require_all("pore_pressure")
     return pore_pressure.unit_weight * search.values(pore_pressure.pressure_head)[:, 0]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.errors import real_numbers
+from fenics_bridge.fem.active_cells import pressures_at
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.types import OfPosition
 
@@ -25,7 +26,7 @@ def at_positions(pressure: Any, outside: OfPosition | None) -> OfPosition:
         x = real_numbers(mesh.comm, "points", points)
         search = PointSearch(mesh, x)
         values = search.values(pressure)[:, 0]
-        elsewhere = np.zeros(len(x)) if outside is None else np.broadcast_to(outside(x), len(x))
+        elsewhere = np.zeros(len(x)) if outside is None else pressures_at(mesh.comm, outside, x, "outside")
         return np.where(search.found, values, elsewhere)
 
     return at

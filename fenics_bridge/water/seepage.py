@@ -24,7 +24,8 @@ from mpm_core.water_checks import LABORATORY_GRAVITY
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree, is_finite, real_numbers, require_mesh
+from fenics_bridge.errors import agree, is_finite, require_mesh
+from fenics_bridge.fem.active_cells import pressures_at
 from fenics_bridge.types import MeshTags, OfPosition
 from fenics_bridge.views import body_text
 from fenics_bridge.water.applied import AppliedBoundary
@@ -136,9 +137,8 @@ class Seepage:
         if self._loading is None:
             return
         points = self._load.function_space.tabulate_dof_coordinates()[:, : self._dim]
-        load = np.broadcast_to(real_numbers(self.domain.comm, "loading", self._loading(points, self.time)), len(points))
-        agree(self.domain.comm, None if np.all(np.isfinite(load)) else "loading gives values that are not finite")
-        self._load.x.array[:] = load
+        loading, time = self._loading, self.time
+        self._load.x.array[:] = pressures_at(self.domain.comm, lambda x: loading(x, time), points, "loading")
 
     # --- solving -----------------------------------------------------------------------------------------------------
 

@@ -49,6 +49,14 @@ def real_numbers(name: str, values: Any) -> NDArray[np.float64]:
     return array.astype(np.float64, order="C")
 
 
+def at_points(name: str, values: Any, count: int) -> NDArray[np.float64]:
+    """Real numbers of points, shape (count,): one for all of them, or one for each."""
+    array = real_numbers(name, values)
+    if array.shape not in ((), (1,), (count,)):
+        raise InputError(f"{name} has shape {array.shape}, expected a number or shape ({count},)")
+    return np.array(np.broadcast_to(array, count))
+
+
 def _shown(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 100 else f"{text[:97]}..."

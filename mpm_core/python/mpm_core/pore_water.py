@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from ._core import InputError
 from .anisotropy import tensors_of_laws
-from .checks import real_numbers
+from .checks import at_points, real_numbers
 from .collective import collectively
 from .conditions import Conditions
 from .input_warnings import warn_of_rain, warn_of_water_density
@@ -167,7 +167,7 @@ class PoreWater(Conditions):
                 raise InputError(f"{name} has no value for the cell tag {tags[np.isnan(values)][0]}")
             return values
         found = given(position) if callable(given) else given
-        return np.array(np.broadcast_to(real_numbers(name, found), len(position)))
+        return at_points(name, found, len(position))
 
     def set_pore_pressure(self, pressure: float | Callable[[NDArray], ArrayLike]) -> None:
         """Give the particles pore pressures: those at the nodes, and linear in each cell.
@@ -185,7 +185,7 @@ class PoreWater(Conditions):
         def at_nodes() -> NDArray[np.float64]:
             points = self.mesh.points
             found = pressure(points) if callable(pressure) else pressure
-            return floats("pressure", np.broadcast_to(real_numbers("pressure", found), len(points)), (len(points),))
+            return floats("pressure", at_points("pressure", found, len(points)), (len(points),))
 
         corners = self.mesh.cells[self.particles.cell]
         values = collectively(self.comm, at_nodes)[corners]

@@ -90,3 +90,29 @@ def test_a_rate_of_rain_in_millimetres_per_hour_is_warned_of(rate):
     model.add_water(porosity=0.4, conductivity=1e-6, retention=curve, drained_surface=True)
     with pytest.warns(RuntimeWarning, match=words):
         model.rain(rate)
+
+
+def test_functions_of_positions_that_return_values_of_another_shape():
+    """Two columns, as of a function that takes y where it should take one value for each point."""
+    domain, tags = box()
+    soil, two = water.PorousSoil(1e-6, porosity=0.4), lambda x, *_: 0.0 * x
+    flow = water.Seepage(domain, soil, tags, [water.Head(LEFT, 1.0)])
+    flow.solve()
+    with pytest.raises(mpm.InputError, match=r"loading gives values of shape \(\d+, 2\), expected \(\d+,\)"):
+        water.Seepage(domain, soil, tags, [water.Head(LEFT, 1.0)], loading=two)
+    with pytest.raises(mpm.InputError, match=r"outside gives values of shape \(1, 2\), expected \(1,\)"):
+        flow.pore_pressure(outside=two)(np.array([[99.0, 0.0]]))
+    law, supports = mpm.LinearElastic(young=1e6, poisson=0.3), [bridge.fixed(BASE)]
+    model = water.Consolidation(domain, law, soil, tags, supports, [water.Head(LEFT, 1.0)])
+    with pytest.raises(mpm.InputError, match=r"pore_pressure gives values of shape \(\d+, 2\), expected \(\d+,\)"):
+        model.initialise(pore_pressure=two)
+    with pytest.raises(mpm.InputError, match=r"surface gives heights of shape \(3, 2\), expected \(3,\)"):
+        bridge.k0_stress(np.zeros((3, 2)), lambda x: np.zeros((3, 2)), 1e4, 0.5)
+    particles = mpm.Model(bridge.background_mesh(domain, facet_tags=tags), law)
+    particles.seed(density=2000.0, per_cell=3)
+    count = len(particles.particles)
+    with pytest.raises(mpm.InputError, match=rf"porosity has shape \(2,\), expected a number or shape \({count},\)"):
+        particles.add_water(porosity=[0.4, 0.5], conductivity=1e-6)
+    particles.add_water(porosity=0.4, conductivity=1e-6)
+    with pytest.raises(mpm.InputError, match=r"pressure has shape \(\d+, 2\), expected a number or shape"):
+        particles.set_pore_pressure(two)
