@@ -8,8 +8,10 @@ reported as well.
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Iterable
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
@@ -32,6 +34,7 @@ from common.slope_fem import (
 )
 from common.summary import write_summary
 from mpi4py import MPI
+from mpm_core.setup_warnings import keeps_volume
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -54,7 +57,12 @@ def parser() -> ArgumentParser:
     p.add_argument(
         "--unreduced", nargs="*", default=[], metavar="SOIL", help="soils of the site whose strength is not reduced"
     )
-    add_flag(p, "--particles", "also find the factor by particles on the same cells, which come to rest or flow")
+    add_flag(
+        p,
+        "--particles",
+        "also find the factor by particles on the same cells, which come to rest or flow; strains are averaged as "
+        "in linear elements, and beside others where these would lock",
+    )
     return p
 
 
@@ -88,6 +96,11 @@ def safety(a: Namespace, cell_size: float, dilation_angle: float) -> bridge.Coll
     return bridge.factor_of_safety(model, weight(a.unit_weight), start=a.start, progress=step_line(title))
 
 
+def averages(a: Namespace, laws: Iterable[Any]) -> bool:
+    """Whether particles average strains: as linear elements do, and beside other elements where they would lock."""
+    return a.elements == "P1-averaged" or (a.elements != "P1" and keeps_volume(laws))
+
+
 def slope_by_particles(a: Namespace) -> bridge.ParticleSafety:
     """The slope's factor by particles on the finest mesh, so stiff that they settle by a hundredth of a cell. Collective."""
     mesh = bridge.slope_mesh(comm, height=a.height, angle=a.angle, crest=a.crest, cell_size=a.cell_size, kind=a.mesh,
@@ -102,7 +115,8 @@ def slope_by_particles(a: Namespace) -> bridge.ParticleSafety:
         model.set_gravity((0.0, -GRAVITY))
         return model
 
-    return bridge.particle_safety(weakened, start=a.start, progress=step_line("particles, factor"))
+    nmd = averages(a, [soil_of(a)])
+    return bridge.particle_safety(weakened, start=a.start, nmd=nmd, progress=step_line("particles, factor"))
 
 
 def site_by_particles(a: Namespace, site: Site) -> bridge.ParticleSafety:
@@ -110,6 +124,7 @@ def site_by_particles(a: Namespace, site: Site) -> bridge.ParticleSafety:
     return bridge.particle_safety(
         lambda factor: site.particles(3, bridge.reduced_strength(site.laws, factor, site.tags_of(a.unreduced))),
         start=a.start,
+        nmd=averages(a, site.laws.values()),
         progress=step_line("particles, factor"),
     )
 

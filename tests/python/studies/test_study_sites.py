@@ -284,3 +284,20 @@ def test_stages_of_the_embankment_average_strains_in_elements_as_in_particles(tm
     )
     assert importlib.import_module("embankment").main(options.split()) == 0
     assert json.loads((folder / "summary.json").read_text())["stress_difference_of_particles_to_fem"] < 1e-4
+
+
+def test_particles_average_strains_as_elements_do_and_beside_quadratic_ones(tmp_path):
+    """Soil without friction: the factor is that of averaged elements on the same cells; without averages it is higher by a quarter."""
+    path = site_in(tmp_path, SITE.replace("cell_size = 0.5", "cell_size = 0.25"))
+    (tmp_path / "block.geo").write_text(
+        BLOCK.replace("Coherence;", WITH_AIR).replace("-e, 1 + e, e, e}", "-e, 3 + e, e, e}")
+    )
+    found = {}
+    for elements in ("P1-averaged", "P2"):
+        folder = tmp_path / elements
+        options = f"--site {path} --elements {elements} --meshes 1 --start 0.7 --particles --output {folder}"
+        assert importlib.import_module("safety").main(options.split()) == 0
+        found[elements] = json.loads((folder / "summary.json").read_text())
+    averaged = found["P1-averaged"]["factor_of_safety"]
+    for summary in found.values():
+        assert summary["factor_of_safety_by_particles"] == pytest.approx(averaged, rel=0.02)
