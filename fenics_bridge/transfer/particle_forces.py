@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from mpm_core.checks import of_kind
 from mpm_core.collective import collectively
 from numpy.typing import ArrayLike, NDArray
 
@@ -37,7 +38,7 @@ def boundary_forces(model: mpm.Model, facet_tag: int | str, pressure: float | Of
     Example:
         >>> model.particles.set("traction", boundary_forces(model, SLOPE, hydrostatic(1.5)))
     """
-    mesh = model.mesh
+    mesh = of_kind("model", model, mpm.Model).mesh
     tags = collectively(model.comm, lambda: mesh.tags_of("facet", facet_tag))
 
     def at(x: NDArray[np.float64]) -> ArrayLike:
@@ -69,7 +70,9 @@ def seepage_forces(model: mpm.Model, pore_pressure: OfPosition) -> NDArray[np.fl
     Example:
         >>> model.particles.set("traction", seepage_forces(model, flow.pore_pressure()))
     """
-    mesh, cells = model.mesh, model.particles.cell
+    mesh, cells = of_kind("model", model, mpm.Model).mesh, model.particles.cell
+    problem = f"pore_pressure is {pore_pressure!r}, expected a function of positions, such as hydrostatic(2.0)"
+    agree(model.comm, None if callable(pore_pressure) else problem)
     p = pressures_at(model.comm, pore_pressure, mesh.points)
     gradient = np.einsum("ck,ckd->cd", p[mesh.cells], _gradients(mesh))
     force = -model.particles.volume[:, None] * gradient[cells]

@@ -116,3 +116,7 @@ def test_functions_of_positions_that_return_values_of_another_shape():
     particles.add_water(porosity=0.4, conductivity=1e-6)
     with pytest.raises(mpm.InputError, match=r"pressure has shape \(\d+, 2\), expected a number or shape"):
         particles.set_pore_pressure(two)
+    with pytest.raises(mpm.InputError, match="pore_pressure is 3.0, expected a function of positions"):
+        bridge.seepage_forces(particles, 3.0)
+    with pytest.raises(mpm.InputError, match="model is .*Mesh.*, expected"):
+        bridge.seepage_forces(domain, two)
