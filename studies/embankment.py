@@ -3,17 +3,20 @@
 The site is a TOML file (`meshes/embankment.toml` unless another is given): a mesh of gmsh, soils with their laws by the names
 of its physical groups, supports by boundary, and a list of stages. Finite elements and quasi-static particles compute the
 same stages; with --nmd linear elements, too, average strains. Then the strength of all soils is divided by --factor, and the
-explicit scheme computes the failure; if a stage has no equilibrium, its failure is computed without reduction of the strength.
+explicit scheme computes the failure, through which pore pressures of the last stage stay as they are in space; if a stage has no
+equilibrium, its failure is computed without reduction of the strength.
 """
 
 from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser
+from collections.abc import Callable
 from time import perf_counter
 
 import numpy as np
 from common import site_slides
+from common.checks import say
 from common.interrupt import Interrupt
 from common.lengths import metres
 from common.movie import particle_movie
@@ -91,6 +94,22 @@ def weaken(site: Site, model: mpm.Model, factor: float) -> None:
         model.assign(model.particles.material + len(site.laws) + len(site.further_laws))
 
 
+def pore_water(particles: bridge.ParticleSite) -> Callable[[], None]:
+    """Function that lets the pore pressures of the last stage act on the particles where they are by then. Collective.
+
+    Pressures on boundaries are dead loads, which move with the particles; beside such loads the forces of the water do too.
+    """
+    model, state = particles.model, particles.state
+
+    def act() -> None:
+        if state.pore_pressure is not None and not state.pressure:
+            model.particles.set("traction", bridge.seepage_forces(model, state.pore_pressure))
+
+    if state.pore_pressure is not None and state.pressure:
+        say("in the slide the forces of the pore water move with the soil, as the pressures of the stages do")
+    return act
+
+
 # --- 4. All together -------------------------------------------------------------------------------------------------
 
 
@@ -110,7 +129,7 @@ def main(arguments: list[str] | None = None) -> int:
     weaken(site, model, factor)
     scene = scene_of(model, sorted(site.laws))
     with Interrupt(comm) as interrupt:
-        result, stopped = site_slides.slide(a, model, folder, interrupt)
+        result, stopped = site_slides.slide(a, model, folder, interrupt, pore_water(particles))
     moved = result.history["largest_displacement_m"][-1]
     summary = {
         "finished_run": stopped is None, "stopped_because": stopped, "stage_without_equilibrium_fem": failed,

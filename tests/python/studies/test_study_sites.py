@@ -301,3 +301,20 @@ def test_particles_average_strains_as_elements_do_and_beside_quadratic_ones(tmp_
     averaged = found["P1-averaged"]["factor_of_safety"]
     for summary in found.values():
         assert summary["factor_of_safety_by_particles"] == pytest.approx(averaged, rel=0.02)
+
+
+def test_pore_pressures_of_an_embankment_stay_in_space_as_it_slides(tmp_path):
+    """Soil that falls into the water gets its uplift, 9.81 kN/m3."""
+    stages = '[[stages]]\nname = "all"\nfill = ["lower", "upper"]\nwater_level = 1.0\n'
+    site = site_file.read_site(site_in(tmp_path, SITE + stages), MPI.COMM_WORLD)
+    embankment = importlib.import_module("embankment")
+    particles, failed = embankment.build(site, 3, 1.0, False)
+    assert failed is None
+    p, act = particles.model.particles, embankment.pore_water(particles)
+    above = p.position[:, 1] > 1.0
+    assert abs(p.traction[above]).max() == 0 and p.traction[~above, 1].sum() == pytest.approx(9810.0)
+    particles.model.remove(~above)
+    particles.model.place(p.position - [0.0, 1.0])
+    assert p.traction[:, 1].sum() == 0
+    act()
+    assert p.traction[:, 1].sum() == pytest.approx(9810.0)
