@@ -144,7 +144,10 @@ def test_ground_at_rest_is_the_elastic_column():
         (lambda: bridge.k0_stress(np.zeros((1, 2)), lambda x: np.nan * x, 1.0, 0.5), "surface has heights of nan m"),
         (lambda: bridge.k0_layered_stress(np.zeros((1, 2)), 0.0, [(-2, 1, 1), (-1, 1, 1)]), "from the top down"),
         (lambda: bridge.k0_layered_stress(np.zeros((1, 2)), 0.0, []), "layers"),
-        (lambda: bridge.hydrostatic([[5.0, 1.0], [0.0, 2.0]]), r"level has points at x = \[5.0, 0.0\] m, expected x that rises"),
+        (
+            lambda: bridge.hydrostatic([[5.0, 1.0], [0.0, 2.0]]),
+            r"level has points at x = \[5.0, 0.0\] m, expected x that rises",
+        ),
         (lambda: bridge.hydrostatic([0.0, 1.0, 2.0]), r"level has shape \(3,\), expected \(k, 2\) points"),
     ],
 )
