@@ -177,6 +177,11 @@ def condition(name: str, given: dict, where: str) -> Any:
     if isinstance(value, list):
         if not value or any(not isinstance(row, list) or len(row) != 2 or not _has_numbers(row) for row in value):
             raise mpm.InputError(f"{where}: {key} is {value!r}, expected a number or rows [days, value]")
+        for (day, _), (later, _) in zip(value, value[1:]):
+            if later <= day:
+                raise mpm.InputError(
+                    f"{where}: {key} has day {later:g} after day {day:g}, expected rows of rising days"
+                )
         return make(name, tuple((DAY * float(day), unit * float(number)) for day, number in value))
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise mpm.InputError(f"{where}: {key} is {value!r}, expected a number or rows [days, value]")

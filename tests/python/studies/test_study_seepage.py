@@ -41,7 +41,11 @@ def read(text, folder):
         ("reservoir = 0.0", 'reservoir = "full"', "boundaries.downstream: reservoir is 'full'"),
         ("reservoir = 0.0", "level = 0.0", "boundaries.downstream has .*expected one of head, reservoir"),
         ("rain = 0.0", "rain = -1.0", "rate is -1"),
-        ("[15.0, 3.0]", "[5.0, 3.0]", "rising times"),
+        (
+            "[15.0, 3.0]",
+            "[5.0, 3.0]",
+            "boundaries.upstream: reservoir has day 5 after day 10, expected rows of rising days",
+        ),
         ('mesh = "dam.geo"', 'mesh = "no.geo"', "there is no file"),
     ],
 )
