@@ -34,7 +34,7 @@ from common.slope_fem import (
 )
 from common.summary import write_summary
 from mpi4py import MPI
-from mpm_core.setup_warnings import keeps_volume
+from mpm_core.law_warnings import keeps_volume
 
 import fenics_bridge as bridge
 import mpm_core as mpm
