@@ -80,7 +80,7 @@ def parser() -> ArgumentParser:
         add_parameter(p, mpm.NorSand, name, value, "NorSand: ")
     add_number(p, "--time", 6.0, "s", "duration", above=0)
     add_number(p, "--air-entry", 2e4, "Pa", "suction up to which pores stay full; 0 lets them run empty", at_least=0)
-    body_runs.add_body_run_options(p, damping=0.0, pic=0.001, nmd=True, frames=60)
+    body_runs.add_body_run_options(p, damping=0.0, pic=0.01, nmd=True, frames=60)
     return p
 
 
