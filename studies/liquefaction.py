@@ -24,6 +24,7 @@ from common.body_runs import BodyRun, follow
 from common.checkpoint import check_restart
 from common.checks import check_cells, check_effect
 from common.figures import Pictures, curve_figure
+from common.front import front
 from common.history import History
 from common.lengths import metres
 from common.movie import QUANTITIES, WET_QUANTITIES, particle_movie
@@ -42,8 +43,6 @@ import mpm_core as mpm
 comm = MPI.COMM_WORLD
 GRAVITY, WATER = 9.81, 1000.0  # m/s2, kg/m3
 GRAINS = 2650.0
-FRONT = 0.01
-"""Part of the soil that lies beyond its front"""
 NOR_SAND = {"critical_void_ratio": 1.0, "critical_compression": 0.03, "critical_slope": 1.25, "dilatancy": 4.0, "hardening": 100.0,
             "rigidity": 200.0, "coupling": 0.2, "attraction": 1000.0}  # fmt: skip
 """Parameters of NorSand that are options, of which the attraction [Pa] keeps some strength at the surface"""
@@ -184,19 +183,6 @@ def set_state(a: Namespace, model: mpm.Model, overconsolidation: float = 1.0) ->
 
 
 # --- 3. The slide ----------------------------------------------------------------------------------------------------
-
-
-def front(x: np.ndarray, volume: np.ndarray) -> float:
-    """Position of the front of the soil [m]: beyond it lies `FRONT` of the volume of all particles. Collective.
-
-    Args:
-        x: positions along the slope (n,) of this rank's particles [m].
-        volume: their volumes (n,) [m2].
-    """
-    x, volume = (np.concatenate(comm.allgather(values)) for values in (x, volume))
-    order = np.argsort(x)
-    filled = np.cumsum(volume[order])
-    return float(np.interp((1 - FRONT) * filled[-1], filled, x[order]))
 
 
 def row(a: Namespace, model: mpm.Model, _: History, report: mpm.Report) -> dict[str, float]:

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from common.animation import save_animation
 from common.figures import Pictures, curve_figure
+from common.front import front
 from common.history import History
 from common.interrupt import Interrupt
 from common.lengths import metres
@@ -43,7 +44,7 @@ COLUMNS = [
     "resting_cells",
 ]  # fmt: skip
 MEASURES = {
-    "retrogression_m": "Failed length of the crest [m]", "runout_m": "Run-out past the toe [m]",
+    "retrogression_m": "Failed length of the crest [m]", "runout_m": "Displacement of the front [m]",
     "work_of_stresses_J_per_m": "Work of the stresses [MJ/m]",
 }  # fmt: skip
 """Quantities by which the mesh sizes are compared. Nearly all of the stresses' work is dissipated in the slips: the
@@ -129,9 +130,9 @@ class Slide:
         moved = np.linalg.norm(p.displacement, axis=1)
         failed = p.initial_position[moved > 0.1 * a.height, 0]
         scarp = comm.allreduce(float(failed.min(initial=np.inf)), MPI.MIN)
-        front = comm.allreduce(float(p.position[:, 0].max(initial=-np.inf)), MPI.MAX)
+        runout = front(p.position[:, 0], p.volume) - front(p.initial_position[:, 0], p.volume)
         self.history.add(
-            time_s=report.time, retrogression_m=max(0.0, a.crest - scarp), runout_m=max(0.0, front - self.case.toe),
+            time_s=report.time, retrogression_m=max(0.0, a.crest - scarp), runout_m=runout,
             work_of_stresses_J_per_m=report.internal_work, kinetic_energy_J_per_m=report.kinetic_energy,
             plastic_fraction=report.plastic_fraction, dt_s=report.dt, resting_cells=report.resting_cells,
         )  # fmt: skip
