@@ -130,7 +130,7 @@ class Slide:
         moved = np.linalg.norm(p.displacement, axis=1)
         failed = p.initial_position[moved > 0.1 * a.height, 0]
         scarp = comm.allreduce(float(failed.min(initial=np.inf)), MPI.MIN)
-        runout = front(p.position[:, 0], p.volume) - front(p.initial_position[:, 0], p.volume)
+        runout = front(p.position[:, 0], p.mass) - front(p.initial_position[:, 0], p.mass)
         self.history.add(
             time_s=report.time, retrogression_m=max(0.0, a.crest - scarp), runout_m=runout,
             work_of_stresses_J_per_m=report.internal_work, kinetic_energy_J_per_m=report.kinetic_energy,

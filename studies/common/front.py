@@ -10,14 +10,14 @@ FRONT = 0.01
 """Part of the soil that lies beyond its front: the foremost particle may have been thrown there by itself"""
 
 
-def front(x: np.ndarray, volume: np.ndarray) -> float:
-    """Position of the front of the soil [m]: beyond it lies `FRONT` of the volume of all particles. Collective.
+def front(x: np.ndarray, amount: np.ndarray) -> float:
+    """Position of the front of the soil [m]: beyond it lies `FRONT` of the soil of all particles. Collective.
 
     Args:
         x: positions along the slope (n,) of this rank's particles [m].
-        volume: their volumes (n,) [m2].
+        amount: their masses, or the volumes of their grains (n,), which do not change.
     """
-    x, volume = (np.concatenate(comm.allgather(values)) for values in (x, volume))
+    x, amount = (np.concatenate(comm.allgather(values)) for values in (x, amount))
     order = np.argsort(x)
-    filled = np.cumsum(volume[order])
+    filled = np.cumsum(amount[order])
     return float(np.interp((1 - FRONT) * filled[-1], filled, x[order]))
