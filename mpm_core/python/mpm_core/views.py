@@ -178,10 +178,10 @@ def plot_particles(particles: Particles, name: str, axes: Any, area: np.ndarray)
     values, label = _plotted(particles, name)
     position = particles.position
     dim = position.shape[1]
-    slope = 1.0 if dim == 3 or len(position) == 0 else np.divide(*np.ptp(position, axis=0)[::-1])  # height over width
-    wide = slope < 1 / 3
+    width, height = np.ptp(position[:, :2], axis=0) if len(position) else (0.0, 0.0)
+    wide = dim == 2 and 3 * height < width
     if axes is None:
-        size = (6.4, 4.8) if not wide else (6.4, 6.0 * max(slope, 0.1) + 1.8)
+        size = (6.4, 6.0 * max(height / width, 0.1) + 1.8) if wide else (6.4, 4.8)
         axes = plt.figure(figsize=size, layout="compressed").add_subplot(projection="3d" if dim == 3 else None)
     if dim == 3:
         drawn = axes.scatter(*position.T, c=values, s=2)
