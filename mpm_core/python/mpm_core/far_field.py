@@ -98,9 +98,7 @@ class FarFields:
         Raises:
             InputError: there is no far field.
         """
-        if self._border is None:
-            raise InputError("the model has no far field, expected attach_far_field before")
-        return np.array(self._core.far_field_displacement).reshape(self._border.held.shape)
+        return np.array(self._core.far_field_displacement).reshape(self._attached().held.shape)
 
     @property
     def far_field_gravity(self) -> NDArray[np.float64]:
@@ -109,9 +107,12 @@ class FarFields:
         Raises:
             InputError: there is no far field.
         """
+        return self._attached().gravity.copy()
+
+    def _attached(self) -> _Border:
         if self._border is None:
             raise InputError("the model has no far field, expected attach_far_field before")
-        return self._border.gravity.copy()
+        return self._border
 
     def _take_border(self, border: _Border | None, displacement: NDArray[np.float64] | None) -> None:
         self._border = border

@@ -13,7 +13,7 @@ from .checks import positive
 from .collective import collectively
 from .input_warnings import warn_of_friction
 from .mesh import floats
-from .surface_description import checked, described, surface_of
+from .surface_description import checked, described, place_of, surface_of
 from .surfaces import KINDS, Plane, Surface
 from .triangles import Triangles
 
@@ -33,14 +33,7 @@ class FieldContact:
 
     @property
     def _index(self) -> int:
-        """Its place among the contacts of the model, which `Model.restore` replaces."""
-        there = len(self.model._field_contacts)
-        if self._number >= there:
-            raise InputError(
-                f"field contact {self._number} is not in the model, which has {there} since it was restored; expected one of "
-                "model.field_contacts"
-            )
-        return self._number
+        return place_of(self._number, "field contact", self.model._field_contacts, "model.field_contacts")
 
     def __repr__(self) -> str:
         entry = self.model._field_contacts[self._index]

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._core import InputError
 from .collisions import add_collision
 from .mesh import floats
 from .outlines import Outline, mesh_box, outline
-from .surface_description import surface_of
+from .surface_description import place_of, surface_of
 
 if TYPE_CHECKING:
     from .model import Model
@@ -31,14 +30,7 @@ class RigidContact:
 
     @property
     def _index(self) -> int:
-        """Its place among the contacts of the model, which `Model.restore` replaces."""
-        there = len(self.model._contacts)
-        if self._number >= there:
-            raise InputError(
-                f"rigid surface {self._number} is not in the model, which has {there} since it was restored; expected one of "
-                "model.contacts"
-            )
-        return self._number
+        return place_of(self._number, "rigid surface", self.model._contacts, "model.contacts")
 
     def __repr__(self) -> str:
         entry = self.model._contacts[self._index]

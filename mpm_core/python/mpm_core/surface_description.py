@@ -54,3 +54,16 @@ def surface_of(model: Model, described: dict[str, Any]) -> Surface:
         return model._triangulated[described["fingerprint"]]
     surface: Surface = KINDS[described["kind"]](**{key: value for key, value in described.items() if key != "kind"})
     return surface
+
+
+def place_of(number: int, what: str, there: list[Any], those: str) -> int:
+    """The number of a surface or contact among those of a model, which `Model.restore` replaces.
+
+    Raises:
+        InputError: the model has fewer since it was restored.
+    """
+    if number >= len(there):
+        raise InputError(
+            f"{what} {number} is not in the model, which has {len(there)} since it was restored; expected one of {those}"
+        )
+    return number
