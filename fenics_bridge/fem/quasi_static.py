@@ -341,13 +341,15 @@ class QuasiStatic(SupportedBody, PointFunctions):
 
     def largest_pore_pressure(self) -> float:
         """Largest pore pressure at a node [Pa]; 0 without water. Collective."""
-        nodal = np.zeros(0) if self._water is None else self._water.x.array
-        return max(self.domain.comm.allgather(float(nodal.max(initial=0.0))))
+        return self._largest_at_nodes(1)
 
     def largest_suction(self) -> float:
         """Largest suction at a node [Pa], as far as it acts on the soil; 0 without any. Collective."""
-        nodal = np.zeros(0) if self._water is None else self._water.x.array
-        return max(self.domain.comm.allgather(float((-nodal).max(initial=0.0))))
+        return self._largest_at_nodes(-1)
+
+    def _largest_at_nodes(self, sign: int) -> float:
+        nodal = np.zeros(0) if self._water is None else sign * self._water.x.array
+        return max(self.domain.comm.allgather(float(nodal.max(initial=0.0))))
 
     def stress_function(self, smooth: bool = False) -> fem.Function:
         """The stress as a function. Collective.

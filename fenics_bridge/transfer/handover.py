@@ -22,7 +22,7 @@ from fenics_bridge.fem.geometry import Geometry, require_same_geometry
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.transfer.dried import balance_dried_soil
-from fenics_bridge.transfer.moved import cell_gradient, fitted_volumes, held_volumes, volume_change
+from fenics_bridge.transfer.moved import fitted_volumes, held_volumes, volume_change
 from fenics_bridge.transfer.pore_pressures import (
     add_to_stress,
     prescribed_mistake,
@@ -181,13 +181,11 @@ def _take_stress_and_state(model: mpm.Model, fem: Any, search: PointSearch, smoo
         state[:, : values.shape[1]] = values
     if takes_pore_pressure(model, fem):
         if model._core.water is not None:
-            set_pore_pressure(model, fem, search)
+            set_pore_pressure(model, fem._water, search)
         else:
             add_to_stress(model, fem, search, smooth, stress, state)
     if isinstance(fem, Consolidation):
-        particles.set("pore_pressure", search.values(fem.pressure)[:, 0])
-        particles.set("pressure_gradient", search.values(cell_gradient(fem.pressure)))
-        model.saturate()
+        set_pore_pressure(model, fem.pressure, search)
         stress = balance_dried_soil(model, fem, search, stress)
     returned = _returned(model.laws, particles.material, stress, state)
     particles.set("stress", stress)
@@ -336,9 +334,10 @@ def _warn_of_missing_loads(model: mpm.Model, fem: Any) -> None:
         ):
             missing.append(f"prescribed displacement at {support.facet_tag!r}")
     if missing and comm.rank == 0:
+        remedies = dict.fromkeys(_REMEDIES.get(name, _OF_LOADS) for name in missing)
         warnings.warn(
             f"the finite elements carry {', '.join(missing)}, which the particles do not, so that the stresses do not "
-            f"balance their loads: give it to them first, by {'; '.join(_REMEDIES.get(name, _OF_LOADS) for name in missing)}",
+            f"balance their loads: give it to them first, by {'; '.join(remedies)}",
             RuntimeWarning,
             stacklevel=3,
         )

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import ufl
+from dolfinx.fem import Function
 from dolfinx.mesh import exterior_facet_indices
 from numpy.typing import NDArray
 
@@ -30,38 +31,23 @@ def takes_pore_pressure(model: mpm.Model, fem: Any) -> bool:
 
     They do as pore water (`Model.add_water`), or where all of them follow `Undrained`, as part of their total stress.
     """
-    if (
-        not isinstance(fem, QuasiStatic)
-        or fem._water is None
-        or any(isinstance(law, mpm.Undrained) for law in fem.laws)
-    ):
+    if not _are_prescribed(fem) or _has_undrained(fem):
         return False
-    used = model.comm.allgather(np.unique(model.particles.material).tolist())
-    return model._core.water is not None or all(
-        isinstance(model.laws[material], mpm.Undrained) for materials in used for material in materials
-    )
+    undrained, used = _undrained(model)
+    return model._core.water is not None or undrained == used
 
 
 def prescribed_mistake(model: mpm.Model, fem: Any) -> str | None:
     """Why particles cannot take the pore pressures that are prescribed to finite elements, in words; None if they can. Collective."""
-    if not isinstance(fem, QuasiStatic) or fem._water is None:
+    if not _are_prescribed(fem):
         return None
-    water = model._core.water
-    if water is not None and water.may_dry and fem.largest_suction() > 1e-9 * fem.largest_pore_pressure():
+    water, suction, (undrained, used) = model._core.water, fem.largest_suction(), _undrained(model)
+    if water is not None and water.may_dry and suction > 1e-9 * fem.largest_pore_pressure():
         return (
-            f"fem is a QuasiStatic with suction of up to {fem.largest_suction():.4g} Pa that acts on the soil, expected none or a "
+            f"fem is a QuasiStatic with suction of up to {suction:.4g} Pa that acts on the soil, expected none or a "
             "water.Consolidation, since particles have retention curves, by which suction acts in part only and water is missing"
         )
-    used = {
-        number for numbers in model.comm.allgather(np.unique(model.particles.material).tolist()) for number in numbers
-    }
-    undrained = {number for number in used if isinstance(model.laws[number], mpm.Undrained)}
-    if (
-        water is None
-        and undrained
-        and undrained != used
-        and not any(isinstance(law, mpm.Undrained) for law in fem.laws)
-    ):
+    if water is None and undrained and undrained != used and not _has_undrained(fem):
         return (
             f"the laws of materials {sorted(undrained)} are Undrained and those of {sorted(used - undrained)} are not, expected "
             "all or none: particles take the pore pressures of fem as parts of total stresses, or not at all"
@@ -69,10 +55,24 @@ def prescribed_mistake(model: mpm.Model, fem: Any) -> str | None:
     return None
 
 
-def set_pore_pressure(model: mpm.Model, fem: QuasiStatic, search: PointSearch) -> None:
-    """Give pore water of particles the pressures of the finite elements. Collective."""
-    model.particles.set("pore_pressure", search.values(fem._water)[:, 0])
-    model.particles.set("pressure_gradient", search.values(cell_gradient(fem._water)))
+def _are_prescribed(fem: Any) -> bool:
+    return isinstance(fem, QuasiStatic) and fem._water is not None
+
+
+def _has_undrained(fem: QuasiStatic) -> bool:
+    return any(isinstance(law, mpm.Undrained) for law in fem.laws)
+
+
+def _undrained(model: mpm.Model) -> tuple[set[int], set[int]]:
+    """Numbers of those laws of the particles that are `Undrained`, and of all that particles have. Collective."""
+    used = set().union(*model.comm.allgather(set(np.unique(model.particles.material).tolist())))
+    return {number for number in used if isinstance(model.laws[number], mpm.Undrained)}, used
+
+
+def set_pore_pressure(model: mpm.Model, pressure: Function, search: PointSearch) -> None:
+    """Give pore water of particles the pressures [Pa] of finite elements, a function that is linear in each cell. Collective."""
+    model.particles.set("pore_pressure", search.values(pressure)[:, 0])
+    model.particles.set("pressure_gradient", search.values(cell_gradient(pressure)))
     model.saturate()
 
 
