@@ -50,8 +50,7 @@ void find_mapped_velocity(double flip_fraction, VelocityField<G>& field)
     for (int a = 0; a < G::dim; ++a)
       field.velocity[i][a] = (flip_fraction * node.momentum[a] + field.velocity[i][a]) * field.per_mass[i];
   }
-  for (const auto& support : field.supports)
-    impose<G::dim>(support, field.velocity[support.node]);
+  impose_supports<G>(field.velocity, field);
 }
 
 namespace

@@ -189,6 +189,19 @@ void find_phase_accelerations(const Vector<G::dim>& gravity, double damping, dou
 }
 
 template <class G>
+void follow_supports(const VelocityField<G>& soil, const VelocityField<G>& water,
+                     std::span<Vector<G::dim>> water_velocity)
+{
+  for (std::size_t s = 0; s < soil.supports.size(); ++s)
+  {
+    const Index i = soil.supports[s].node;
+    if (soil.part.has_node[i] && !is_light(soil, i) && !is_light(water, i))
+      for (int a = 0; a < G::dim; ++a)
+        water_velocity[i][a] += soil.imposed[s][a];
+  }
+}
+
+template <class G>
 void close_sides(const VelocityField<G>& soil, const WaterField<G>& water, std::span<Vector<G::dim>> soil_velocity,
                  std::span<Vector<G::dim>> water_velocity)
 {
@@ -250,6 +263,7 @@ void add_phase_work(const VelocityField<G>& soil, const WaterField<G>& water, st
 #define INSTANTIATE(G)                                                                                                 \
   template void find_phase_accelerations(const Vector<G::dim>&, double, double, double, VelocityField<G>&,             \
                                          WaterField<G>&);                                                              \
+  template void follow_supports(const VelocityField<G>&, const VelocityField<G>&, std::span<Vector<G::dim>>);          \
   template void close_sides(const VelocityField<G>&, const WaterField<G>&, std::span<Vector<G::dim>>,                  \
                             std::span<Vector<G::dim>>);                                                                \
   template void add_phase_work(const VelocityField<G>&, const WaterField<G>&, std::span<const unsigned char>,          \

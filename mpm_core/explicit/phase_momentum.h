@@ -18,6 +18,13 @@ template <class G>
 void find_phase_accelerations(const Vector<G::dim>& gravity, double damping, double dt, double density,
                               VelocityField<G>& soil, WaterField<G>& water);
 
+/// Changes the velocity of the water where that of the soil was prescribed, as that was: what the particles around a
+/// fixed node give it is no flow of water past the soil.
+/// @pre boundary conditions were imposed on the same velocity of the soil last
+template <class G>
+void follow_supports(const VelocityField<G>& soil, const VelocityField<G>& water,
+                     std::span<Vector<G::dim>> water_velocity);
+
 /// Makes velocities of soil and water agree at impervious sides along their normals, without a change of momentum but
 /// where the soil is held.
 template <class G>

@@ -31,6 +31,7 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
   find_start_velocity(soil);
   find_start_velocity(water.motion);
   close_sides<G>(soil, water, soil.start_velocity, water.motion.start_velocity);
+  follow_supports<G>(soil, water.motion, water.motion.start_velocity);
   // Momentum balance of both phases, coupled by the drag at the step's end
   clock.begin(Phase::momentum);
   find_phase_accelerations(gravity, options.damping, dt, density, soil, water);
@@ -47,6 +48,7 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
     find_mapped_velocity(1 - options.pic_fraction, *phase);
   }
   close_sides<G>(soil, water, soil.velocity, water.motion.velocity);
+  follow_supports<G>(soil, water.motion, water.motion.velocity);
   clock.begin(Phase::momentum);
   add_phase_work(soil, water, exchange.owned, gravity, options.damping, dt, density, model.totals);
   // Flow of the water through the soil, and volumetric strains

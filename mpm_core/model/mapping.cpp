@@ -225,8 +225,7 @@ void find_start_velocity(VelocityField<G>& field)
     for (int a = 0; a < G::dim; ++a)
       field.start_velocity[i][a] = node.momentum[a] * per_mass;
   }
-  for (const auto& support : field.supports)
-    impose<G::dim>(support, field.start_velocity[support.node]);
+  impose_supports<G>(field.start_velocity, field);
 }
 
 template <class G>

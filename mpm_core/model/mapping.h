@@ -79,6 +79,22 @@ inline void with_values_of_vertices(const Mesh<D>& mesh, const VelocityField<G>&
     work([&](const Nodal& nodal, Index cell, int k) -> const Vector<D>& { return nodal[mesh.cells[cell][k]]; });
 }
 
+/// Makes nodal velocities satisfy the boundary conditions of a field.
+/// @post field.imposed has the changes
+template <class G>
+inline void impose_supports(std::span<Vector<G::dim>> velocity, VelocityField<G>& field)
+{
+  field.imposed.resize(field.supports.size());
+  for (std::size_t s = 0; s < field.supports.size(); ++s)
+  {
+    Vector<G::dim>& v = velocity[field.supports[s].node];
+    const Vector<G::dim> before = v;
+    impose<G::dim>(field.supports[s], v);
+    for (int a = 0; a < G::dim; ++a)
+      field.imposed[s][a] = v[a] - before[a];
+  }
+}
+
 /// v_i at the start of the step, from the sums at nodes, under the boundary conditions.
 template <class G>
 void find_start_velocity(VelocityField<G>& field);

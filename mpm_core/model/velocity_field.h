@@ -90,3 +90,4 @@ struct VelocityField
   std::vector<VolumeMean> mean_stress;       ///< of the nodes; empty until first used with it
 };
 } // namespace mpm::model
+  std::vector<Vector<D>> imposed;            ///< per support: what it changed of the velocity that was found last

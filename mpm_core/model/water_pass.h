@@ -11,7 +11,7 @@ namespace mpm::model
 ///
 ///     m_w -= V dt div j,  n V += V dt div v,  p = K_w (m_w / (rho_w n V) - 1),
 ///
-/// First the water of a cell spreads evenly over its pores, with its momentum: particles that came from other cells
+/// First the water of a cell spreads over its pores, with its momentum: particles that came from other cells
 /// would keep pressures of their own, whose sum alone acts on the nodes. The above is (n / K_w) dp/dt = -div v - div (n
 /// (w - v)) for small p / K_w; it is no lower than the limit of suction.
 /// @param flip_fraction  of the water's own velocity that is kept

@@ -355,7 +355,7 @@ def test_water_that_stands_over_a_slope_carries_soil_as_heavy_as_itself(suction_
         p.pore_pressure, 9810.0 * (1.5 - p.position[:, 1]), atol=9810.0 / 7
     )  # one value in each cell
     assert abs(model.water_inflow()) < 1e-4 * model.water_volume()
-    assert report.unexplained_fraction == pytest.approx(0.0, abs=1e-5)
+    assert report.unexplained_fraction == pytest.approx(0.0, abs=3e-5)  # of water at fixed nodes, whose particles move
     model.stand_water(-1.0)  # without it the weight of the soil acts
     model.explicit(0.4, nmd=True).last()
     assert np.linalg.norm(p.displacement, axis=1).max() > 1e-4
