@@ -7,6 +7,8 @@
 #include "transfer/lanes.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 namespace mpm::model
 {
@@ -18,14 +20,25 @@ struct WaterChange
 {
   double growth;           ///< volumetric strain of the soil
   double outflow;          ///< mass that leaves a unit of volume [kg/m3]
+  double spread;           ///< fraction of what particles differ by that spreads evenly over the pores
   double content;          ///< mass in a unit of volume of the pores at the start [kg/m3]
-  Vector<D> exchange;      ///< change of its velocity as it spreads evenly over them
+  Vector<D> exchange;      ///< change of its velocity as it spreads
   AffineField<D> velocity; ///< by which that of the water changes
 };
 
+/// How much of a difference of pressures between the particles of a cell flows off over dt, as a wave of the length 2 h
+/// between impervious sides does: the rate is pi^2 c / h^2, c = k K_w / (n gamma_w).
+template <class G, int D = G::dim>
+double spread_fraction(const WaterField<G>& water, const CellShape<D>& shape, Index cell, double modulus, double dt)
+{
+  const PoreMoments<D>& pores = water.cells[cell];
+  const double h = smallest_altitude<D>(shape), pi = std::numbers::pi;
+  return -std::expm1(-dt * pi * pi * modulus * pores.pores / (pores.drag * h * h));
+}
+
 template <class G, int D = G::dim>
 WaterChange<D> water_change(const Mesh<D>& mesh, const VelocityField<G>& soil, const WaterField<G>& water, Index cell,
-                            double dt, bool nmd)
+                            double modulus, double dt, bool nmd)
 {
   const auto change = [&](Index i) -> const Vector<D>& { return water.motion.velocity_change[i]; };
   double divergence = 0;
@@ -34,12 +47,16 @@ WaterChange<D> water_change(const Mesh<D>& mesh, const VelocityField<G>& soil, c
   const CellMoments<G>& moments = water.motion.moments[cell];
   const PoreMoments<D>& pores = water.cells[cell];
   const double content = moments.mass / pores.pores;
+  const double spread = spread_fraction(water, mesh.shapes[cell], cell, modulus, dt);
   Vector<D> exchange;
   for (int a = 0; a < D; ++a)
-    exchange[a] = (moments.momentum[a] - content * pores.pore_velocity[a]) / moments.mass;
+    exchange[a] = spread * (moments.momentum[a] - content * pores.pore_velocity[a]) / moments.mass;
   return {nmd ? averaged_strain(mesh, soil, cell, dt * divergence) : dt * divergence,
           nmd ? mean_of_nodes<D>(mesh.cells[cell], water.motion.volumetric_strain) : outflow(mesh, water, cell, dt),
-          content, exchange, affine_field<D>(mesh, cell, change)};
+          spread,
+          content,
+          exchange,
+          affine_field<D>(mesh, cell, change)};
 }
 
 /// sum V p
@@ -79,7 +96,8 @@ bool change_water(Particles<D>& particles, const PoreWater& water, const Run& ru
                       {
                         const Lanes volume = piece[volume_at], before = piece[porosity_at];
                         const Lanes pores = volume * (before + c.growth), porosity = pores / (volume * (1 + c.growth));
-                        piece[mass_at] = volume * (c.content * before - c.outflow);
+                        piece[mass_at] +=
+                            c.spread * (volume * c.content * before - piece[mass_at]) - volume * c.outflow;
                         const Lanes pressure = modulus * (piece[mass_at] / (density * pores) - 1);
                         piece[pressure_at] = pressure > least ? pressure : Lanes{} + least;
                         piece[porosity_at] = porosity;
@@ -133,7 +151,8 @@ std::array<double, 2> water_pass(Model<G>& model, double dt, double flip_fractio
   std::array<double, 2> work{};
   const auto change_run = [&](const Run& run)
   {
-    const auto change = water_change(model.mesh, model.fields.front(), model.water_field, run.cell, dt, nmd);
+    const auto change =
+        water_change(model.mesh, model.fields.front(), model.water_field, run.cell, model.water->modulus, dt, nmd);
     const double half_strain = 0.5 * (change.growth + change.outflow / density);
     work[0] -= half_strain * pressure_sum(particles, run);
     if (run.resting)
