@@ -11,6 +11,7 @@
 #include "model/integration.h"
 #include "model/mapping.h"
 #include "model/material_points.h"
+#include "model/pressure_relaxation.h"
 #include "model/reproducible.h"
 #include "model/resting_nodes.h"
 
@@ -26,13 +27,15 @@ namespace
 /// nodes, where the run asks for them.
 /// @note Collective where it does
 template <class G>
-void find_means(const Mesh<G::dim>& mesh, NodeExchange& exchange, const ExplicitOptions& options, double dt,
-                VelocityField<G>& field)
+void find_means(Model<G>& model, const ExplicitOptions& options, double dt, VelocityField<G>& field)
 {
   if (options.nmd)
-    average_strains(mesh, exchange, field.velocity, dt, field);
+  {
+    average_strains(model.mesh, model.exchange, field.velocity, dt, field);
+    relax_pressures(model, dt, field);
+  }
   if (options.integration == Integration::dual_domain)
-    average_gradients(mesh, exchange, field);
+    average_gradients(model.mesh, model.exchange, field);
 }
 
 /// Adds forces at the nodes beside those of gravity and stresses: of rigid surfaces, of damping, of absorbing sides.
@@ -88,7 +91,7 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
       add_transfer_work(field, exchange.owned, dt, model.energy);
     note_rayleigh_work(exchange.owned, dt, field, model.totals);
     clock.begin(Phase::averaging);
-    find_means(mesh, exchange, options, dt, field);
+    find_means(model, options, dt, field);
   }
   note_field_contact_work(model, dt);
   update_particles(model, options, dt, true, clock); // (18), (20), stresses; migration
@@ -118,7 +121,7 @@ void update_stress_last(Model<G>& model, const ExplicitOptions& options, double 
     add_work(field, model.exchange.owned, gravity, options.damping, dt, model.totals);
     note_rayleigh_work(model.exchange.owned, dt, field, model.totals);
     clock.begin(Phase::averaging);
-    find_means(model.mesh, model.exchange, options, dt, field);
+    find_means(model, options, dt, field);
   }
   note_field_contact_work(model, dt);
   update_particles(model, options, dt, true, clock);
@@ -136,7 +139,7 @@ void update_stress_first(Model<G>& model, const ExplicitOptions& options, double
   {
     find_start_velocity(field);
     field.velocity = field.start_velocity;
-    find_means(model.mesh, model.exchange, options, dt, field);
+    find_means(model, options, dt, field);
   }
   clock.begin(Phase::particles);
   particle_pass(model, {dt, false, true, 0, options.nmd, dt});

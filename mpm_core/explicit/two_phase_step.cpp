@@ -5,6 +5,7 @@
 #include "explicit/phase_momentum.h"
 #include "model/mapping.h"
 #include "model/pore_forces.h"
+#include "model/pressure_relaxation.h"
 #include "model/resting_nodes.h"
 #include "model/water_mapping.h"
 #include "model/water_pass.h"
@@ -30,8 +31,8 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
   map_to_nodes(model);
   find_start_velocity(soil);
   find_start_velocity(water.motion);
-  close_sides<G>(soil, water, soil.start_velocity, water.motion.start_velocity);
   follow_supports<G>(soil, water.motion, water.motion.start_velocity);
+  close_sides<G>(soil, water, soil.start_velocity, water.motion.start_velocity);
   // Momentum balance of both phases, coupled by the drag at the step's end
   clock.begin(Phase::momentum);
   find_phase_accelerations(gravity, options.damping, dt, density, soil, water);
@@ -47,8 +48,8 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
     sum_shared(exchange, phase->velocity);
     find_mapped_velocity(1 - options.pic_fraction, *phase);
   }
-  close_sides<G>(soil, water, soil.velocity, water.motion.velocity);
   follow_supports<G>(soil, water.motion, water.motion.velocity);
+  close_sides<G>(soil, water, soil.velocity, water.motion.velocity);
   clock.begin(Phase::momentum);
   add_phase_work(soil, water, exchange.owned, gravity, options.damping, dt, density, model.totals);
   // Flow of the water through the soil, and volumetric strains
@@ -57,6 +58,7 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
   if (options.nmd)
   {
     average_strains(mesh, exchange, soil.velocity, dt, soil);
+    relax_pressures(model, dt, soil);
     average_outflow(mesh, exchange, dt, water);
   }
   // Nodes to particles: the water's velocity, mass and pressure; then (18), (20), effective stresses; migration

@@ -240,6 +240,7 @@ template <class G, int D>
 void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Vector<G::dim>>& nodal, double dt,
                      VelocityField<G>& field)
 {
+  field.integration.relaxing.clear();
   // Averages of stress have found the volumes, and left them side by side.
   const bool known = has_averaged_forces(field.integration) && !field.integration.strains_in_full;
   const auto volume_of = [&](Index c)

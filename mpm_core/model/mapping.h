@@ -128,7 +128,8 @@ template <class G, int D = G::dim>
 double averaged_strain(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell, double own)
 {
   const double mean = mean_of_nodes<D>(mesh.cells[cell], field.volumetric_strain);
-  return own + averaged_strain_fraction(field.integration, cell) * (mean - own);
+  const double relaxed = field.integration.relaxing.empty() ? 0 : field.integration.relaxing[cell].strain;
+  return own + averaged_strain_fraction(field.integration, cell) * (mean - own) + relaxed;
 }
 
 /// Local damping of FLAC for one component, alpha |R| sign(v): its mean over a step through which R acts.

@@ -35,6 +35,17 @@ struct NodeMass
   double even; ///< if the particles filled their cells evenly [kg]
 };
 
+/// How a cell gives way to a pressure that its nodes do not feel; see `relax_pressures`.
+template <int D>
+struct RelaxingCell
+{
+  double compliance;                 ///< 1 / M [1/Pa]; not positive where the cell takes no part
+  double strain;                     ///< volumetric, of the step
+  double pressure;                   ///< total, mean of its particles [Pa]
+  Vector<D> centre;                  ///< of mass of its particles
+  std::array<double, D + 1> weights; ///< of the means of its nodes in the linear prediction of its pressure
+};
+
 /// Integration over cells, and what it needs where it is not the sum over particles.
 template <int D>
 struct CellIntegration
@@ -46,7 +57,8 @@ struct CellIntegration
   /// Strains are averaged in full wherever forces are averaged, by whatever fraction.
   bool strains_in_full = false;
   std::vector<double> averaged_of_cell; ///< per owned cell: the fraction of averaging; empty where it is one everywhere
-  std::vector<NodeMass> masses;         ///< scratch, per node
+  std::vector<RelaxingCell<D>> relaxing;       ///< per owned cell, in explicit steps of undrained soil; else empty
+  std::vector<NodeMass> masses;                ///< scratch, per node
   std::vector<VolumeMean> mean_stress_of_cell; ///< scratch: integral and volume
   std::vector<std::array<double, 2>> fills;    ///< per node: volumes of particles and of cells around it
   std::vector<unsigned char> whole; ///< per owned cell, at the step's start: 1 where full; not with particles
@@ -78,6 +90,7 @@ struct VelocityField
 
   // How its nodes move
   std::vector<Support<D>> supports;          ///< its boundary conditions
+  std::vector<Vector<D>> imposed;            ///< per support: what it changed of the velocity that was found last
   std::vector<DashpotNode<D>> dashpots;      ///< of its absorbing sides, by rising node
   IncomingWave<D> incoming;                  ///< through them
   std::vector<FreeField<D>> free_fields;     ///< beside them
@@ -90,4 +103,3 @@ struct VelocityField
   std::vector<VolumeMean> mean_stress;       ///< of the nodes; empty until first used with it
 };
 } // namespace mpm::model
-  std::vector<Vector<D>> imposed;            ///< per support: what it changed of the velocity that was found last
