@@ -2,9 +2,9 @@
 /// @file
 /// What the nodes do to the particles of a batch: motions of its cells, and strains of its particles.
 
+#include "base/lanes.h"
 #include "model/particle_pass.h"
 #include "particles/batches.h"
-#include "transfer/lanes.h"
 
 #include <bit>
 

@@ -32,8 +32,7 @@ inline double half_work(const double (&stress)[n_stress<D>][batch_size], const B
   {
     const LaneMask mine = number < static_cast<std::int64_t>(runs - r); // the lanes beyond hold what was there before
     for (std::size_t k = 0; k < G::n_working; ++k)
-      sum +=
-          mine ? transfer::load(stress[k] + r) * scratch.cells[r / lanes].increment[working_component<G>[k]] : Lanes{};
+      sum += mine ? load(stress[k] + r) * scratch.cells[r / lanes].increment[working_component<G>[k]] : Lanes{};
   }
   return 0.5 * transfer::sum(sum);
 }

@@ -1,10 +1,10 @@
 #include "model/water_mapping.h"
 
+#include "base/lanes.h"
 #include "model/anisotropy.h"
 #include "model/mapping.h"
 #include "model/material_points.h"
 #include "parallel/agreement.h"
-#include "transfer/lanes.h"
 
 #include <algorithm>
 

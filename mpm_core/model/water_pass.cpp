@@ -1,10 +1,10 @@
 #include "model/water_pass.h"
 
+#include "base/lanes.h"
 #include "model/mapping.h"
 #include "model/pic_loss.h"
 #include "model/water_mapping.h"
 #include "transfer/affine_field.h"
-#include "transfer/lanes.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 /// @file
 /// Vector fields that are affine in a cell, worked out with the components of a vector side by side in a register.
 
-#include "transfer/lanes.h"
+#include "base/lanes.h"
 #include "transfer/moments.h"
 
 namespace mpm::transfer

@@ -2,7 +2,7 @@
 /// @file
 /// Sums over the particles of a cell for all of its vertices at once, from the moments of the cell.
 
-#include "transfer/lanes.h"
+#include "base/lanes.h"
 #include "transfer/moments.h"
 
 namespace mpm::transfer

@@ -3,7 +3,7 @@
 /// The strain increment that a cell's particles share; for one cell, T = double, or for several at once, T = Lanes.
 
 #include "base/geometry.h"
-#include "transfer/lanes.h"
+#include "base/lanes.h"
 
 namespace mpm::transfer
 {

@@ -1,7 +1,7 @@
 #include "transfer/kinematics.h"
 
+#include "base/lanes.h"
 #include "mesh/search.h"
-#include "transfer/lanes.h"
 #include "transfer/turn.h"
 
 #include <algorithm>

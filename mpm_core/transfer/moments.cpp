@@ -1,8 +1,8 @@
 #include "transfer/moments.h"
 
+#include "base/lanes.h"
 #include "parallel/rounded_sums.h"
 #include "transfer/affine_field.h"
-#include "transfer/lanes.h"
 
 namespace mpm::transfer
 {

@@ -2,8 +2,8 @@
 /// @file
 /// Rotation of stresses, several at once.
 
+#include "base/lanes.h"
 #include "base/tensor.h"
-#include "transfer/lanes.h"
 
 namespace mpm::transfer
 {

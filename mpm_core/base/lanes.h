@@ -1,7 +1,8 @@
 #pragma once
 /// @file
 /// Kernels over a run of particles, a few at once, in vectors of constant length. With some ten particles in a cell,
-/// the scalar remainder of a loop that the compiler vectorises would cost as much as all the rest.
+/// the scalar remainder of a loop that the compiler vectorises would cost as much as all the rest. A function of `T` is
+/// for one number (`double`) or for those of a few particles (`Lanes`), and rounds alike in both.
 
 #include "base/types.h"
 
@@ -10,7 +11,7 @@
 #include <cstring>
 #include <type_traits>
 
-namespace mpm::transfer
+namespace mpm::base
 {
 /// Particles that a kernel treats at once: one vector register of AVX2, half of one of AVX-512, two of SSE2 or NEON.
 /// With ten particles in a cell, eight at once would leave more lanes idle than they save instructions.
@@ -35,7 +36,18 @@ inline Lanes load(const double* column)
   return numbers;
 }
 
+/// The same, or one entry
+template <class T>
+inline T load_as(const double* column)
+{
+  if constexpr (std::is_same_v<T, double>)
+    return *column;
+  else
+    return load(column);
+}
+
 /// Writes them there.
+inline void store(double number, double* column) { *column = number; }
 inline void store(const Lanes& numbers, double* column) { std::memcpy(column, &numbers, sizeof(Lanes)); }
 
 /// Entries of N columns
@@ -119,20 +131,54 @@ inline void add_lanes(const std::array<const double*, N>& columns, Index first, 
     add(load(columns, last - lanes), number >= lanes - (last - i));
 }
 
+/// `f` of a number, or of that of each lane
+template <class T, class F>
+inline T each(const T& a, F&& f)
+{
+  if constexpr (std::is_same_v<T, double>)
+    return f(a);
+  else
+  {
+    T results{};
+    for (int l = 0; l < lanes; ++l)
+      results[l] = f(a[l]);
+    return results;
+  }
+}
+
 /// Square root of a number or of each lane
 template <class T>
 inline T root(const T& a)
 {
-  if constexpr (std::is_same_v<T, double>)
-    return std::sqrt(a);
-  else
-  {
-    T roots{};
-    for (int l = 0; l < lanes; ++l)
-      roots[l] = std::sqrt(a[l]);
-    return roots;
-  }
+  return each(a, [](double x) { return std::sqrt(x); });
 }
+
+template <class T>
+inline T absolute(const T& a)
+{
+  return a < 0 ? -a : a;
+}
+
+/// The larger of two numbers, the second where one is not a number
+template <class T>
+inline T larger(const T& a, const T& b)
+{
+  return a > b ? a : b;
+}
+
+/// The smaller of two numbers, the second where one is not a number
+template <class T>
+inline T smaller(const T& a, const T& b)
+{
+  return a < b ? a : b;
+}
+
+/// What the comparison of two T gives: `bool` or `LaneMask`
+template <class T>
+using Mask = decltype(T{} < T{});
+
+inline bool any(bool mask) { return mask; }
+inline bool any(const LaneMask& mask) { return (mask[0] | mask[1] | mask[2] | mask[3]) != 0; }
 
 inline double sum(const Lanes& a)
 {
@@ -140,4 +186,4 @@ inline double sum(const Lanes& a)
   const Pair halves = __builtin_shufflevector(a, a, 0, 1) + __builtin_shufflevector(a, a, 2, 3);
   return halves[0] + halves[1];
 }
-} // namespace mpm::transfer
+} // namespace mpm::base
