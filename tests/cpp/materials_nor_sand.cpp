@@ -13,9 +13,10 @@ using mpm::base::SymTensor;
 namespace
 {
 const NorSand law{0.9, 0.03, 1.25, 4, 100, 200, 0.2, 100e3, 0.8, 0.2, 0};
+const Sand constants = sand_of(law);
 
 /// A random stress with pressures around the image pressure, and a random strain increment of some size
-Start<3> random_start(std::mt19937& random, double size)
+Start<double> random_start(std::mt19937& random, double size)
 {
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform;
@@ -25,16 +26,21 @@ Start<3> random_start(std::mt19937& random, double size)
     stress[k] = 15e3 * normal(random);
     strain[k] = size * normal(random);
   }
-  Start<3> a{.law = law, .bulk = bulk_per_pressure(law), .extension = extension_of(law), .least = 1e-3};
-  a.deviator = deviator<3>(stress);
-  a.strain = deviator<3>(strain);
+  Start<double> a{constants};
+  a.square = square_along<3>(deviator<3>(stress), deviator<3>(strain));
+  a.cube = cube_along<3>(deviator<3>(stress), deviator<3>(strain));
   a.pressure = 50e3 + 100e3 * uniform(random);
-  a.image = 100e3 * (0.5 + uniform(random));
-  a.log = std::log(a.pressure / a.image);
+  a.log_image = std::log(100e3 * (0.5 + uniform(random)));
+  a.log = std::log(a.pressure) - a.log_image;
   a.volumetric = size * normal(random);
   a.volume = 1.8;
   a.psi = -0.2 + 0.4 * uniform(random);
   return a;
+}
+
+Equations<double> residual_of(const Start<double>& a, const Result<double>& r)
+{
+  return residual(a, r, most_per_image(r));
 }
 } // namespace
 
@@ -45,20 +51,24 @@ TEST(NorSand, NewtonFindsWhatBracketsFind)
   for (const double size : {1e-5, 1e-4, 1e-3, 1e-2})
     for (int point = 0; point < 1000; ++point)
     {
-      const Start<3> a = random_start(random, size);
-      const Result<3> trial = result_of(a, a.bulk * a.volumetric, 0, 0);
+      const Start<double> a = random_start(random, size);
+      const Result<double> trial = result_of(a, 0.0, 0.0);
       if (excess(trial) <= 1e-9)
         continue;
-      const Result<3> found = bracketed(a);
-      EXPECT_LT(residual(a, found).cwiseAbs().maxCoeff(), 1e-9);
+      const Result<double> found = bracketed(a);
+      const Equations<double> error = residual_of(a, found);
+      EXPECT_LT(std::max(std::abs(error.hardening), std::abs(error.yield)), 1e-9);
+      EXPECT_NEAR(found.growth, constants.bulk * (a.volumetric - found.multiplier * found.image.slope * found.log),
+                  1e-14);
+      EXPECT_NEAR(found.log, a.log + found.growth - found.image_growth, 1e-12);
       EXPECT_LE(found.log, 1 + 1e-12);
-      const std::optional<Result<3>> fast = newton(a, trial);
-      if (!fast || found.vertex)
+      Result<double> fast = trial;
+      if (!newton(a, fast, true) || found.vertex)
         continue;
       ++compared;
-      EXPECT_NEAR(fast->growth, found.growth, 1e-9);
-      EXPECT_NEAR(fast->image_growth, found.image_growth, 1e-9);
-      EXPECT_NEAR(fast->multiplier, found.multiplier, 1e-9 * (1 + found.multiplier));
+      EXPECT_NEAR(fast.growth, found.growth, 1e-9);
+      EXPECT_NEAR(fast.image_growth, found.image_growth, 1e-9);
+      EXPECT_NEAR(fast.multiplier, found.multiplier, 1e-9 * (1 + found.multiplier));
     }
   EXPECT_GT(compared, 500);
 }
@@ -69,20 +79,21 @@ TEST(NorSand, JacobianIsTheDerivativeOfTheResidual)
   std::uniform_real_distribution<double> uniform;
   for (int point = 0; point < 200; ++point)
   {
-    const Start<3> a = random_start(random, 1e-3);
-    const std::array<double, 3> at{0.4 * uniform(random) - 0.2, 0.4 * uniform(random) - 0.2, 1e-3 * uniform(random)};
+    const Start<double> a = random_start(random, 1e-3);
+    const double growth = 0.4 * uniform(random) - 0.2, m = 1e-3 * uniform(random);
     const bool vertex = point % 2 == 0;
-    const Eigen::Matrix3d exact = jacobian(a, result_of(a, at[0], at[1], at[2], vertex));
-    for (std::size_t k = 0; k < 3; ++k)
+    const Result<double> r = result_of(a, growth, m, vertex);
+    const Jacobian<double> exact = jacobian(a, r, most_per_image(r), growth_slopes(a, r));
+    const auto expect_slopes = [&](double step_of_growth, double step_of_m, double hardening, double yield)
     {
-      const double step = k < 2 ? 1e-6 : 1e-8;
-      std::array<double, 3> more = at, less = at;
-      more[k] += step;
-      less[k] -= step;
-      const Eigen::Vector3d change = residual(a, result_of(a, more[0], more[1], more[2], vertex)) -
-                                     residual(a, result_of(a, less[0], less[1], less[2], vertex));
-      const Eigen::Vector3d error = change / (2 * step) - exact.col(static_cast<int>(k));
-      EXPECT_LT(error.cwiseAbs().maxCoeff(), 1e-6 * (1 + exact.cwiseAbs().maxCoeff()));
-    }
+      const Result<double> more = result_of(a, growth + step_of_growth, m + step_of_m, vertex);
+      const Result<double> less = result_of(a, growth - step_of_growth, m - step_of_m, vertex);
+      const Equations<double> end = residual_of(a, more), start = residual_of(a, less);
+      const double length = 2 * (step_of_growth + step_of_m);
+      EXPECT_NEAR((end.hardening - start.hardening) / length, hardening, 1e-6 * (1 + std::abs(hardening)));
+      EXPECT_NEAR((end.yield - start.yield) / length, yield, 1e-6 * (1 + std::abs(yield)));
+    };
+    expect_slopes(1e-6, 0, exact.hardening.image_growth, exact.yield.image_growth);
+    expect_slopes(0, 1e-8, exact.hardening.multiplier, exact.yield.multiplier);
   }
 }

@@ -2,7 +2,7 @@
 /// @file
 /// What a constitutive law is given and what it gives back.
 
-#include "base/types.h"
+#include "base/lanes.h"
 
 #include <limits>
 #include <string_view>
@@ -40,17 +40,18 @@ struct PointBatch
   std::array<const double*, D * D> deformation{};
 };
 
-/// Stress and strain increment of a point as tensors
-template <int D>
-std::pair<SymTensor<D>, SymTensor<D>> tensors_of(const PointBatch<D>& points, Index i)
+/// Stress and strain increment of a point as tensors, or of a few points from there on
+template <int D, class T = double>
+auto tensors_of(const PointBatch<D>& points, Index i)
 {
-  SymTensor<D> stress, strain;
+  std::pair<std::array<T, n_stress<D>>, std::array<T, n_stress<D>>> tensors;
+  auto& [stress, strain] = tensors;
   for (std::size_t k = 0; k < n_stress<D>; ++k)
   {
-    stress[k] = points.stress[k][i];
-    strain[k] = points.strain_increment[k][i] * (k < 3 ? 1 : 0.5); // engineering shear to components
+    stress[k] = load_as<T>(points.stress[k] + i);
+    strain[k] = load_as<T>(points.strain_increment[k] + i) * (k < 3 ? 1 : 0.5); // engineering shear to components
   }
-  return {stress, strain};
+  return tensors;
 }
 
 /// What of a batch a law needs beyond what all are given, so that it is not worked out for others.

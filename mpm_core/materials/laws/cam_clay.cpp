@@ -46,9 +46,10 @@ Result<D> result_of(const Start<D>& a, double x, double multiplier)
   r.x = x;
   r.multiplier = multiplier;
   r.y = a.elastic * (a.volumetric - x);
-  r.pressure = a.pressure * std::exp(r.y);
+  const Growth growth = growth_of(r.y);
+  r.pressure = a.pressure * growth.factor;
   r.preconsolidation = a.preconsolidation * std::exp(a.plastic * x);
-  r.trial = secant_trial<D>(a.shear_ratio * a.elastic * a.pressure * mean_growth(r.y), a.deviator, a.strain);
+  r.trial = secant_trial<D>(a.shear_ratio * a.elastic * a.pressure * growth.mean, a.deviator, a.strain);
   r.ratio = 1 / (1 + 6 * r.trial.shear * multiplier / a.slope_squared);
   return r;
 }
@@ -66,7 +67,7 @@ Result<D> returned(const Start<D>& a)
   {
     const double x = critical * fraction, left = 1 - fraction;
     const double pc = a.preconsolidation * std::exp(a.plastic * x);
-    return result_of(a, x, fraction / (left * pc * sum * mean_growth(sum * critical * left)));
+    return result_of(a, x, fraction / (left * pc * sum * growth_of(sum * critical * left).mean));
   };
   const double scale = a.preconsolidation * a.preconsolidation;
   const auto excess = [&](const Result<D>& r) { return r.yield(a.slope_squared) / scale; };
@@ -90,7 +91,7 @@ Result<D> returned(const Start<D>& a)
 template <int D>
 SecantSlopes slopes(const Start<D>& a, const Result<D>& r, bool plastic, double volumetric, double trial_q)
 {
-  const double shear_by_y = a.shear_ratio * a.elastic * a.pressure * mean_growth_slope(r.y);
+  const double shear_by_y = a.shear_ratio * a.elastic * a.pressure * growth_of(r.y).slope;
   double dx = 0, dm = 0, ratio_by_y = 0, ratio_by_m = 0;
   if (plastic)
   {

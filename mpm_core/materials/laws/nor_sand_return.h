@@ -1,9 +1,9 @@
 #pragma once
 /// @file
-/// The return of NorSand to its yield surface: three equations for the pressure, the image pressure and the plastic
-/// multiplier at the end of an increment, by Newton's method, and by brackets where that fails.
+/// The return of NorSand to its yield surface: two equations for the image pressure and the plastic multiplier at the
+/// end of an increment, by Newton's method, and by brackets where that fails.
 
-#include "base/eigen.h"
+#include "base/lanes.h"
 #include "materials/laws/nor_sand.h"
 #include "materials/tools/lode.h"
 #include "materials/tools/root.h"
@@ -11,222 +11,310 @@
 
 #include <array>
 #include <limits>
-#include <optional>
 
 namespace mpm::materials::nor_sand
 {
-/// A point at the start of an increment: pressures and volumetric strains are positive in compression here
-template <int D>
-struct Start
+/// The law with the constants of its returns worked out
+struct Sand
 {
-  const NorSand& law;
-  double bulk = 0;         ///< K / p
-  double extension = 0;    ///< b, see `extension_of`
-  double least = 0;        ///< pressure that is kept at least [Pa]
-  double pressure = 0;     ///< p
-  double image = 0;        ///< p_i
-  double log = 0;          ///< ln(p / p_i)
-  double volumetric = 0;   ///< volumetric strain increment
-  double volume = 0;       ///< specific volume at the end
-  double psi = 0;          ///< psi_i with the void ratio of the end and the image pressure of the start
-  SymTensor<D> deviator{}; ///< of the stress
-  SymTensor<D> strain{};   ///< deviatoric strain increment, tensor components
-
-  /// ln(p / p_i) after an elastic increment
-  double trial_log() const { return log + bulk * volumetric; }
+  double bulk, rigidity;    ///< K / p and G / p
+  double compression;       ///< lambda
+  double slope, dilatancy;  ///< M and chi
+  double fall, hardening;   ///< N chi and H
+  double extension;         ///< b = g^4 of triaxial extension
+  double attraction, least; ///< the latter the pressure that is kept at least [Pa]
+  double log_least;         ///< its logarithm
+  double log_image;         ///< ln of the law's image pressure in Pa
+  double volume;            ///< specific volume at the law's start
+  double psi;               ///< psi_i at that image pressure, less the specific volume
 };
 
-/// b = g^4 of triaxial extension
-inline double extension_of(const NorSand& law)
+inline Sand sand_of(const NorSand& law)
 {
   const double square = (1 + law.critical_slope / 3) * (1 + law.critical_slope / 3);
-  return square * square;
+  const double least = 1e-6 * (law.reference_pressure + law.attraction), image = law.image_pressure + law.attraction;
+  return {bulk_per_pressure(law),
+          law.rigidity,
+          law.critical_compression,
+          law.critical_slope,
+          law.dilatancy,
+          law.coupling * law.dilatancy,
+          law.hardening,
+          square * square,
+          law.attraction,
+          least,
+          std::log(least),
+          std::log(image),
+          1 + law.void_ratio,
+          law.critical_compression * std::log(image / law.reference_pressure) - law.critical_void_ratio - 1};
 }
 
-template <int D>
-Start<D> start_of(const NorSand& law, const PointBatch<D>& points, Index i)
+/// A point at the start of an increment, and the increment: pressures and volumetric strains are positive in
+/// compression here. The trial deviator s + 2 G e has the end's secant modulus G, so its invariants are polynomials in
+/// 2 G, and a return works with numbers alone: those of one point or, as `Lanes`, of a few points side by side.
+template <class T>
+struct Start
 {
-  const auto [stress, strain] = tensors_of(points, i);
-  Start<D> a{law, bulk_per_pressure(law), extension_of(law)};
-  a.least = 1e-6 * (law.reference_pressure + law.attraction);
-  a.pressure = law.attraction - mean<D>(stress);
-  a.image = (law.image_pressure + law.attraction) * std::exp(points.state[1][i]);
-  a.log = std::log(a.pressure / a.image);
-  a.volumetric = -3 * mean<D>(strain);
-  a.volume = (1 + law.void_ratio) * std::exp(points.state[2][i] - a.volumetric);
-  a.psi =
-      a.volume - 1 - law.critical_void_ratio + law.critical_compression * std::log(a.image / law.reference_pressure);
-  a.deviator = deviator<D>(stress);
-  a.strain = deviator<D>(strain);
-  return a;
-}
+  const Sand& sand;
+  T pressure{};              ///< p
+  T log_image{};             ///< ln of p_i in Pa
+  T log{};                   ///< ln(p / p_i)
+  T volumetric{};            ///< volumetric strain increment
+  T volume{};                ///< specific volume at the end
+  T psi{};                   ///< psi_i with the void ratio of the end and the image pressure of the start
+  std::array<T, 3> square{}; ///< q^2 of the trial by 2 G
+  std::array<T, 4> cube{};   ///< q^3 cos(3 theta) of the trial by 2 G; only points that may yield need it
+
+  /// ln(p / p_i) after an elastic increment
+  T trial_log() const { return log + sand.bulk * volumetric; }
+};
 
 /// What the image pressure at the end of an increment decides
+template <class T>
 struct Image
 {
-  double slope, slope_by_psi; ///< M_i of triaxial compression
-  double limit, limit_by_psi; ///< chi psi_i / M_i, at most 1: then not even z = 1, at the vertex, softens
+  T slope, slope_by_psi; ///< M_i of triaxial compression
+  T limit, limit_by_psi; ///< chi psi_i / M_i, at most 1: then not even z = 1, at the vertex, softens
 };
 
-inline Image image_of(const NorSand& law, double psi)
+template <class T>
+Image<T> image_of(const Sand& sand, const T& psi)
 {
-  const double fall = law.coupling * law.dilatancy, least = law.critical_slope / 2;
-  const double slope = law.critical_slope - fall * std::abs(psi);
-  Image image{std::max(slope, least), slope > least ? (psi > 0 ? -fall : fall) : 0, 0, 0};
-  image.limit = std::min(law.dilatancy * psi / image.slope, 1.0);
-  image.limit_by_psi = image.limit < 1 ? (law.dilatancy - image.limit * image.slope_by_psi) / image.slope : 0;
-  return image;
+  const T least = T{} + sand.slope / 2, fallen = sand.slope - sand.fall * absolute(psi), one = T{} + 1;
+  const T slope = larger(fallen, least), per_slope = 1 / slope;
+  const T slope_by_psi = fallen > least ? (psi > 0 ? T{} - sand.fall : T{} + sand.fall) : T{};
+  const T limit = smaller(sand.dilatancy * psi * per_slope, one);
+  return {slope, slope_by_psi, limit, limit < one ? (sand.dilatancy - limit * slope_by_psi) * per_slope : T{}};
 }
 
-/// The direction of a deviator in the deviatoric plane, which its return keeps
-struct Direction
+/// The trial deviator. The return keeps its direction.
+template <class T>
+struct Trial
 {
-  double lode;   ///< cos(3 theta)
-  double factor; ///< g = M / M(theta), by which q counts more than in triaxial compression
+  T shear;           ///< G
+  T shear_by_growth; ///< its derivative by ln of the growth of the pressure
+  T q;               ///< sqrt(3 J2)
+  T lode;            ///< cos(3 theta)
+  T factor;          ///< g = M / M(theta), by which q counts more than in triaxial compression
 };
 
-template <int D>
-Direction direction_of(const Start<D>& a, const SecantTrial<D>& trial)
+/// Derivative of g by cos(3 theta)
+template <class T>
+T factor_by_lode(const Sand& sand, const T& factor)
 {
-  const double lode = lode_cosine<D>(trial.deviator, trial.q);
-  return {lode, std::sqrt(std::sqrt(0.5 * (1 + a.extension - (a.extension - 1) * lode)))};
+  return (1 - sand.extension) / (8 * factor * factor * factor);
 }
 
-/// Derivative of g by the trial deviator
-template <int D>
-SymTensor<D> factor_by_deviator(const Start<D>& a, const SecantTrial<D>& trial, const Direction& direction)
-{
-  const double by_lode = (1 - a.extension) / (8 * direction.factor * direction.factor * direction.factor);
-  SymTensor<D> slope = lode_cosine_slope<D>(trial.deviator, trial.q, direction.lode);
-  for (double& component : slope)
-    component *= by_lode;
-  return slope;
-}
-
-/// The end of an increment by its three unknowns
-template <int D>
+/// The end of an increment by its unknowns, the growth of the image pressure and the multiplier
+template <class T>
 struct Result
 {
-  double growth;       ///< y = ln of p over that of the start
-  double image_growth; ///< L = ln of p_i over that of the start
-  double multiplier;   ///< m = de_q^p / g
-  bool vertex;         ///< whether q = 0, where the surface meets the axis
-  double log;          ///< z = ln(p / p_i): g D = M_i z and g q / p = M_i (1 - z)
-  Image image;
-  double pressure;
-  SecantTrial<D> trial;
-  double shear_per_pressure; ///< G of the increment over p of its end
-  Direction direction;
+  T image_growth; ///< L = ln of p_i over that of the start
+  T multiplier;   ///< m = de_q^p / g
+  bool vertex;    ///< whether q = 0, where the surface meets the axis
+  Image<T> image;
+  T scale;    ///< 1 + K/p m M_i
+  T log;      ///< z = ln(p / p_i): g D = M_i z and g q / p = M_i (1 - z)
+  T growth;   ///< y = ln of p over that of the start
+  T pressure; ///< p
+  Trial<T> trial;
 
   /// Of the deviator to that of the trial: by the yield surface, since the trial may be larger by many digits
-  double ratio() const
+  T ratio() const
   {
-    return vertex ? 0 : multiplier > 0 ? image.slope * (1 - log) * pressure / (direction.factor * trial.q) : 1;
+    if (vertex)
+      return T{};
+    return multiplier > 0 ? image.slope * (1 - log) * pressure / (trial.factor * trial.q) : T{} + 1;
   }
 };
 
-template <int D>
-Result<D> result_of(const Start<D>& a, double growth, double image_growth, double multiplier, bool vertex = false)
+/// The result without the direction of its deviator. The pressure follows from the volumetric strain,
+/// y = K/p (volumetric strain - m M_i z).
+template <class T>
+Result<T> undirected_result(const Start<T>& a, const T& image_growth, const T& multiplier, bool vertex = false)
 {
-  Result<D> r{growth, image_growth, multiplier, vertex, 0, {}, 0, {}, 0, {}};
-  r.log = a.log + growth - image_growth;
-  r.image = image_of(a.law, a.psi + a.law.critical_compression * image_growth);
-  r.pressure = a.pressure * std::exp(growth);
-  r.trial = secant_trial<D>(a.law.rigidity * a.pressure * mean_growth(growth), a.deviator, a.strain);
-  r.shear_per_pressure = r.trial.shear / r.pressure;
-  r.direction = direction_of(a, r.trial);
+  const Sand& sand = a.sand;
+  const Image<T> image = image_of<T>(sand, a.psi + sand.compression * image_growth);
+  const T scale = 1 + sand.bulk * multiplier * image.slope;
+  const T log = (a.trial_log() - image_growth) / scale;
+  const T y = sand.bulk * (a.volumetric - multiplier * image.slope * log);
+  const Growth<T> growth = growth_of(y);
+  const T modulus = sand.rigidity * a.pressure, shear = modulus * growth.mean;
+  const T q = root(larger(polynomial<T>(a.square, 2 * shear), T{}));
+  return {image_growth,
+          multiplier,
+          vertex,
+          image,
+          scale,
+          log,
+          y,
+          a.pressure * growth.factor,
+          {shear, modulus * growth.slope, q, T{} + 1, T{} + 1}};
+}
+
+template <class T>
+void set_direction(const Start<T>& a, Trial<T>& trial)
+{
+  const double b = a.sand.extension;
+  trial.lode = lode_cosine<T>(polynomial<T>(a.cube, 2 * trial.shear), trial.q);
+  trial.factor = root(root(0.5 * (1 + b - (b - 1) * trial.lode)));
+}
+
+template <class T>
+Result<T> result_of(const Start<T>& a, const T& image_growth, const T& multiplier, bool vertex = false)
+{
+  Result<T> r = undirected_result(a, image_growth, multiplier, vertex);
+  set_direction(a, r.trial);
   return r;
 }
 
-/// g q of the trial less the plastic strain's, less that of the yield surface, over p: the yield function where m is 0
-template <int D>
-double excess(const Result<D>& r)
+/// Whether an elastic result may lie outside of the yield surface: the largest g, that of extension, decides.
+template <class T>
+Mask<T> may_yield(const Sand& sand, const Result<T>& r)
 {
-  const double g = r.direction.factor;
-  return g * (r.trial.q / r.pressure - 3 * r.shear_per_pressure * g * r.multiplier) - r.image.slope * (1 - r.log);
+  return (1 + sand.slope / 3) * r.trial.q > r.image.slope * (1 - r.log) * r.pressure;
+}
+
+/// g q of the trial less the plastic strain's, less that of the yield surface, over p: the yield function where m is 0
+template <class T>
+T excess(const Result<T>& r)
+{
+  const T& g = r.trial.factor;
+  return g * (r.trial.q - 3 * r.trial.shear * g * r.multiplier) / r.pressure - r.image.slope * (1 - r.log);
 }
 
 /// Its derivative by g
-template <int D>
-double excess_by_factor(const Result<D>& r)
+template <class T>
+T excess_by_factor(const Result<T>& r)
 {
-  return r.trial.q / r.pressure - 6 * r.shear_per_pressure * r.direction.factor * r.multiplier;
+  return (r.trial.q - 6 * r.trial.shear * r.trial.factor * r.multiplier) / r.pressure;
 }
 
-/// Derivative of g by G of the trial
-template <int D>
-double factor_by_shear(const Start<D>& a, const Result<D>& r)
+/// Derivatives by ln of the growth of the pressure, by which the trial has its shear modulus
+template <class T>
+struct GrowthSlopes
 {
-  return 2 * product<D>(factor_by_deviator(a, r.trial, r.direction), a.strain);
+  T q;      ///< of q of the trial
+  T factor; ///< of g
+  T excess; ///< of the excess, at a fixed z
+};
+
+template <class T>
+GrowthSlopes<T> growth_slopes(const Start<T>& a, const Result<T>& r)
+{
+  const T &q = r.trial.q, &g = r.trial.factor, &shear = r.trial.shear_by_growth, twice = 2 * r.trial.shear;
+  const T per_q = q * q * q > 0 ? 1 / q : T{};
+  const T q_slope = polynomial_slope<T>(a.square, twice) * per_q * shear;
+  const T lode = (2 * polynomial_slope<T>(a.cube, twice) * shear * per_q * per_q - 3 * r.trial.lode * q_slope) * per_q;
+  const T factor = factor_by_lode(a.sand, g) * lode;
+  const T over = q_slope - q - 3 * (shear - r.trial.shear) * g * r.multiplier;
+  return {q_slope, factor, g * over / r.pressure + excess_by_factor(r) * factor};
 }
 
-/// The three equations of a plastic increment, all without unit: volumetric strain, hardening and yield surface
-template <int D>
-Eigen::Vector3d residual(const Start<D>& a, const Result<D>& r)
+/// p_max / p_i = exp(z - chi psi_i / M_i)
+template <class T>
+T most_per_image(const Result<T>& r)
 {
-  const double m = r.multiplier, hardening = std::expm1(r.log - r.image.limit);
-  return {r.growth - a.bulk * (a.volumetric - m * r.image.slope * r.log),
-          r.image_growth - m * a.law.hardening * hardening, r.vertex ? r.log - 1 : excess(r)};
+  return each(T(r.log - r.image.limit), [](double x) { return std::exp(x); });
 }
 
-/// Derivatives of the equations by y, L and m
-template <int D>
-Eigen::Matrix3d jacobian(const Start<D>& a, const Result<D>& r)
+/// The two equations of a plastic increment, both without unit, or changes of them
+template <class T>
+struct Equations
 {
-  const double m = r.multiplier, lambda = a.law.critical_compression, slope = r.image.slope, z = r.log;
-  const double slope_by_image = r.image.slope_by_psi * lambda;
-  const double hardening = a.law.hardening * std::exp(z - r.image.limit);
-  const double shear_by_growth = a.law.rigidity * a.pressure * mean_growth_slope(r.growth);
-  const double g = r.direction.factor;
-  const double q_by_growth = (q_by_shear<D>(r.trial, a.strain) * shear_by_growth - r.trial.q) / r.pressure +
-                             3 * a.law.rigidity * mean_growth_slope(-r.growth) * g * m;
-  const double excess_by_growth = g * q_by_growth + excess_by_factor(r) * factor_by_shear(a, r) * shear_by_growth;
-  Eigen::Matrix3d by;
-  by.row(0) << 1 + a.bulk * m * slope, a.bulk * m * (slope_by_image * z - slope), a.bulk * slope * z;
-  by.row(1) << -m * hardening, 1 + m * hardening * (1 + r.image.limit_by_psi * lambda), a.law.hardening - hardening;
+  T hardening, yield;
+};
+
+/// @param most  p_max / p_i of the result
+template <class T>
+Equations<T> residual(const Start<T>& a, const Result<T>& r, const T& most)
+{
+  return {r.image_growth - r.multiplier * a.sand.hardening * (most - 1), r.vertex ? r.log - 1 : excess(r)};
+}
+
+/// Changes of the unknowns, or derivatives by them
+template <class T>
+struct Unknowns
+{
+  T image_growth, multiplier;
+};
+
+/// Derivatives of z
+template <class T>
+Unknowns<T> log_slopes(const Start<T>& a, const Result<T>& r)
+{
+  const T slope_by_image = r.image.slope_by_psi * a.sand.compression, per_scale = 1 / r.scale;
+  return {-(1 + a.sand.bulk * r.multiplier * slope_by_image * r.log) * per_scale,
+          -a.sand.bulk * r.image.slope * r.log * per_scale};
+}
+
+/// Derivatives of the equations
+template <class T>
+struct Jacobian
+{
+  Unknowns<T> hardening, yield;
+
+  /// Changes of the unknowns by which the equations change by `by`
+  Unknowns<T> solve(const Equations<T>& by) const
+  {
+    const auto& [a, b] = hardening;
+    const auto& [c, d] = yield;
+    const T per_determinant = 1 / (a * d - b * c);
+    return {(d * by.hardening - b * by.yield) * per_determinant, (a * by.yield - c * by.hardening) * per_determinant};
+  }
+};
+
+/// @param most  p_max / p_i of the result
+template <class T>
+Jacobian<T> jacobian(const Start<T>& a, const Result<T>& r, const T& most, const GrowthSlopes<T>& by_growth)
+{
+  const double h = a.sand.hardening;
+  const T hardening = r.multiplier * h * most, slope_by_image = r.image.slope_by_psi * a.sand.compression;
+  const Unknowns<T> log = log_slopes(a, r);
+  const Unknowns<T> by_hardening{1 - hardening * (log.image_growth - r.image.limit_by_psi * a.sand.compression),
+                                 h * (1 - most) - hardening * log.multiplier};
   if (r.vertex)
-    by.row(2) << 1, -1, 0;
-  else
-    by.row(2) << excess_by_growth + slope, -slope_by_image * (1 - z) - slope, -3 * r.shear_per_pressure * g * g;
-  return by;
+    return {by_hardening, log};
+  const T plastic = 3 * r.trial.shear * r.trial.factor * r.trial.factor / r.pressure;
+  return {by_hardening,
+          {by_growth.excess * (1 + log.image_growth) - slope_by_image * (1 - r.log) + r.image.slope * log.image_growth,
+           (by_growth.excess + r.image.slope) * log.multiplier - plastic}};
 }
 
-/// Newton's method from the elastic result; nothing where it does not find a result that makes sense
-template <int D>
-std::optional<Result<D>> newton(const Start<D>& a, Result<D> r)
+/// Newton's method from the elastic result; false where it does not find a result that makes sense.
+/// @param yields  of a few points those that yield; the others stay elastic
+template <class T>
+bool newton(const Start<T>& a, Result<T>& r, const Mask<T>& yields)
 {
-  const double tolerance = 1e-13 * (1 + std::abs(r.growth) + r.trial.q / r.pressure);
+  const T tolerance = 1e-13 * (1 + absolute(r.growth) + r.trial.q / r.pressure);
   for (int iteration = 0; iteration < 15; ++iteration)
   {
-    const Eigen::Vector3d error = residual(a, r);
-    if (!error.allFinite())
-      return {};
-    if (error.cwiseAbs().maxCoeff() <= tolerance)
-      return r.multiplier > 0 && r.log <= 1 ? std::optional(r) : std::nullopt;
-    const Eigen::Vector3d step = jacobian(a, r).inverse() * error;
-    r = result_of(a, r.growth - step[0], r.image_growth - step[1], r.multiplier - step[2]);
+    const T most = most_per_image(r);
+    const Equations<T> error = residual(a, r, most);
+    const Mask<T> is_open = yields & !((absolute(error.hardening) <= tolerance) & (absolute(error.yield) <= tolerance));
+    if (!any(is_open))
+      return !any(Mask<T>(yields & !((r.multiplier > 0) & (r.log <= 1))));
+    const Unknowns<T> step = jacobian(a, r, most, growth_slopes(a, r)).solve(error);
+    r = result_of<T>(a, r.image_growth - (is_open ? step.image_growth : T{}),
+                     r.multiplier - (is_open ? step.multiplier : T{}));
   }
-  return {};
+  return false;
 }
 
-/// The result for a multiplier, without regard to the yield surface: volumetric strain gives z, falling with L, as
-/// (z_trial - L) / (1 + K/p m M_i), and then hardening gives w = ln(1 + L / (m H)) = z - chi psi_i / M_i, between 0 and
-/// its value at L = 0.
-template <int D>
-Result<D> hardened(const Start<D>& a, double m, bool vertex = false)
+/// The result for a multiplier, without regard to the yield surface: z falls with L, and hardening gives
+/// w = ln(1 + L / (m H)) = z - chi psi_i / M_i, between 0 and its value at L = 0.
+inline Result<double> hardened(const Start<double>& a, double m, bool vertex = false)
 {
-  const double scale = m * a.law.hardening, trial = a.trial_log();
-  const auto logs = [&](double image_growth) -> std::array<double, 2>
+  const double scale = m * a.sand.hardening;
+  const auto most = [&](double image_growth) // ln of p_max / p_i
   {
-    const Image image = image_of(a.law, a.psi + a.law.critical_compression * image_growth);
-    const double z = (trial - image_growth) / (1 + a.bulk * m * image.slope);
-    return {z, z - image.limit};
+    const Image<double> image = image_of(a.sand, a.psi + a.sand.compression * image_growth);
+    return (a.trial_log() - image_growth) / (1 + a.sand.bulk * m * image.slope) - image.limit;
   };
-  const double end = logs(0)[1];
-  const auto gap = [&](double w) { return w - logs(scale * std::expm1(w))[1]; };
+  const double end = most(0);
+  const auto gap = [&](double w) { return w - most(scale * std::expm1(w)); };
   const double w = m > 0 && end != 0 ? root_between(gap, {0, -end}, {end, gap(end)}) : 0;
-  const double image_growth = scale * std::expm1(w);
-  return result_of(a, logs(image_growth)[0] + image_growth - a.log, image_growth, m, vertex);
+  return result_of<double>(a, scale * std::expm1(w), m, vertex);
 }
 
 /// The largest bracket [lower, upper] of a function that falls from positive values, by doubling
@@ -246,21 +334,20 @@ double root_above(F&& f, double lower, double step)
 
 /// The same by brackets in the multiplier. Beyond the vertex the return goes to it, unless its cone of plastic strains,
 /// g de_v^p >= M_i de_q^p, does not have the one that takes all of q away.
-template <int D>
-Result<D> bracketed(const Start<D>& a)
+inline Result<double> bracketed(const Start<double>& a)
 {
   double lower = 0;
   if (const double beyond = a.trial_log() - 1; beyond > 0)
   {
-    const double step = beyond / (a.bulk * a.law.critical_slope);
+    const double step = beyond / (a.sand.bulk * a.sand.slope);
     lower = root_above([&](double m) { return hardened(a, m).log - 1; }, 0, step);
-    const Result<D> vertex = hardened(a, lower, true);
-    if (!(vertex.trial.q > 3 * vertex.trial.shear * vertex.direction.factor * lower))
+    const Result<double> vertex = hardened(a, lower, true);
+    if (!(vertex.trial.q > 3 * vertex.trial.shear * vertex.trial.factor * lower))
       return vertex;
   }
-  const Result<D> start = hardened(a, lower);
-  const double g = start.direction.factor;
-  const double step = std::max(excess(start) / (3 * start.shear_per_pressure * g * g), 1e-12);
+  const Result<double> start = hardened(a, lower);
+  const double g = start.trial.factor;
+  const double step = std::max(excess(start) * start.pressure / (3 * start.trial.shear * g * g), 1e-12);
   return hardened(a, root_above([&](double m) { return excess(hardened(a, m)); }, lower, step));
 }
 } // namespace mpm::materials::nor_sand

@@ -9,16 +9,16 @@
 
 namespace mpm::materials
 {
-template <int D>
-double mean(const SymTensor<D>& stress)
+template <int D, class T = double>
+T mean(const std::array<T, n_stress<D>>& stress)
 {
   return (stress[0] + stress[1] + stress[2]) / 3;
 }
 
-template <int D>
-SymTensor<D> deviator(SymTensor<D> stress)
+template <int D, class T = double>
+std::array<T, n_stress<D>> deviator(std::array<T, n_stress<D>> stress)
 {
-  const double p = mean<D>(stress);
+  const T p = mean<D>(stress);
   for (std::size_t k = 0; k < 3; ++k)
     stress[k] -= p;
   return stress;
@@ -35,13 +35,13 @@ double radius(const SymTensor<D>& s)
 }
 
 /// Full contraction of two tensors
-template <int D>
-double product(const SymTensor<D>& a, const SymTensor<D>& b)
+template <int D, class T = double>
+T product(const std::array<T, n_stress<D>>& a, const std::array<T, n_stress<D>>& b)
 {
-  double sum = 0;
-  for (std::size_t k = 0; k < n_stress<D>; ++k)
-    sum += (k < 3 ? 1 : 2) * a[k] * b[k];
-  return sum;
+  T shear = a[3] * b[3];
+  for (std::size_t k = 4; k < n_stress<D>; ++k)
+    shear += a[k] * b[k];
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + 2 * shear;
 }
 
 /// The mean p and the factor r of the deviator s of a new stress p 1 + r s depend on the strain increment through the

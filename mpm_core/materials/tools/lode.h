@@ -2,14 +2,35 @@
 /// @file
 /// The Lode angle of a deviator, by the cosine of its threefold.
 
+#include "base/lanes.h"
 #include "materials/tools/deviator.h"
 
 namespace mpm::materials
 {
-template <int D>
-double determinant(const SymTensor<D>& s)
+/// Value of a polynomial with these coefficients, that of 1 first
+template <class T, std::size_t N>
+T polynomial(const std::array<T, N>& coefficients, const T& x)
 {
-  const double in_plane = s[0] * s[1] - s[3] * s[3];
+  T value = coefficients[N - 1];
+  for (std::size_t k = N - 1; k-- > 0;)
+    value = value * x + coefficients[k];
+  return value;
+}
+
+/// Its derivative
+template <class T, std::size_t N>
+T polynomial_slope(const std::array<T, N>& coefficients, const T& x)
+{
+  T value = static_cast<double>(N - 1) * coefficients[N - 1];
+  for (std::size_t k = N - 1; k-- > 1;)
+    value = value * x + static_cast<double>(k) * coefficients[k];
+  return value;
+}
+
+template <int D, class T = double>
+T determinant(const std::array<T, n_stress<D>>& s)
+{
+  const T in_plane = s[0] * s[1] - s[3] * s[3];
   if constexpr (D == 2)
     return in_plane * s[2];
   else
@@ -17,15 +38,15 @@ double determinant(const SymTensor<D>& s)
 }
 
 /// The square s s of a tensor
-template <int D>
-SymTensor<D> square(const SymTensor<D>& s)
+template <int D, class T = double>
+std::array<T, n_stress<D>> square(const std::array<T, n_stress<D>>& s)
 {
-  const double xy = s[3] * s[3];
+  const T xy = s[3] * s[3];
   if constexpr (D == 2)
     return {s[0] * s[0] + xy, s[1] * s[1] + xy, s[2] * s[2], (s[0] + s[1]) * s[3]};
   else
   {
-    const double yz = s[4] * s[4], xz = s[5] * s[5];
+    const T yz = s[4] * s[4], xz = s[5] * s[5];
     return {s[0] * s[0] + xy + xz,
             s[1] * s[1] + xy + yz,
             s[2] * s[2] + yz + xz,
@@ -35,16 +56,31 @@ SymTensor<D> square(const SymTensor<D>& s)
   }
 }
 
-/// cos(3 theta) of a deviator with q = sqrt(3 J2): 1 in triaxial compression, -1 in triaxial extension, 0 where one of
-/// the principal stresses is their mean. Where there is no direction, q^3 = 0, it is 1.
-template <int D>
-double lode_cosine(const SymTensor<D>& deviator, double q)
+/// q^2 = 3 J2 of a deviator s + x t, as a polynomial in x, the coefficient of 1 first
+template <int D, class T = double>
+std::array<T, 3> square_along(const std::array<T, n_stress<D>>& s, const std::array<T, n_stress<D>>& t)
 {
-  const double cube = q * q * q;
-  return cube > 0 ? std::clamp(-13.5 * determinant<D>(deviator) / cube, -1.0, 1.0) : 1;
+  return {1.5 * product<D>(s, s), 3 * product<D>(s, t), 1.5 * product<D>(t, t)};
 }
 
-/// Its derivative by the deviator, itself a deviator; zero where there is no direction
+/// q^3 cos(3 theta) = -13.5 det of a deviator s + x t, as a polynomial in x
+template <int D, class T = double>
+std::array<T, 4> cube_along(const std::array<T, n_stress<D>>& s, const std::array<T, n_stress<D>>& t)
+{
+  return {-13.5 * determinant<D>(s), -13.5 * product<D>(square<D>(s), t), -13.5 * product<D>(square<D>(t), s),
+          -13.5 * determinant<D>(t)};
+}
+
+/// cos(3 theta) of a deviator with q = sqrt(3 J2) and cube = -13.5 det: 1 in triaxial compression, -1 in triaxial
+/// extension, 0 where one of the principal stresses is their mean. Where there is no direction, q^3 = 0, it is 1.
+template <class T>
+T lode_cosine(const T& cube, const T& q)
+{
+  const T largest = q * q * q, one = T{} + 1;
+  return largest > 0 ? larger(smaller(cube / largest, one), -one) : one;
+}
+
+/// Derivative of cos(3 theta) by the deviator, itself a deviator; zero where there is no direction
 template <int D>
 SymTensor<D> lode_cosine_slope(const SymTensor<D>& deviator, double q, double cosine)
 {

@@ -3,25 +3,57 @@
 /// Elasticity with moduli in proportion to the pressure, by their secants over an increment: what its laws share.
 /// Source: Borja (1991), CMAME 92, 343-353.
 
+#include "base/lanes.h"
 #include "materials/tools/deviator.h"
 
 #include <cmath>
 
 namespace mpm::materials
 {
-/// (exp(y) - 1) / y: the secant modulus over that of the start, where y is ln of the growth of the pressure. Most
-/// increments are small, and take its series.
-inline double mean_growth(double y)
+/// The growth of the pressure over an increment, by its logarithm y
+template <class T>
+struct Growth
 {
-  if (std::abs(y) > 0.01)
-    return std::expm1(y) / y;
-  return 1 + y * (1.0 / 2 + y * (1.0 / 6 + y * (1.0 / 24 + y * (1.0 / 120 + y * (1.0 / 720)))));
+  T factor; ///< exp(y): the pressure over that of the start
+  T mean;   ///< (exp(y) - 1) / y: the secant modulus over that of the start
+  T slope;  ///< derivative of the mean by y
+};
+
+/// Most increments are small, and take the series of the mean.
+inline constexpr double small_growth = 0.05;
+
+[[gnu::noinline]] inline Growth<double> large_growth(double y)
+{
+  const double factor = std::exp(y), mean = std::expm1(y) / y;
+  return {factor, mean, (factor - mean) / y};
 }
 
-/// Its derivative
-inline double mean_growth_slope(double y)
+template <class T>
+Growth<T> growth_of(const T& y)
 {
-  return std::abs(y) < 1e-3 ? 0.5 + y / 3 + y * y / 8 : (std::exp(y) - mean_growth(y)) / y;
+  constexpr std::array c{1.0, 1.0 / 2, 1.0 / 6, 1.0 / 24, 1.0 / 120, 1.0 / 720, 1.0 / 5040, 1.0 / 40320, 1.0 / 362880};
+  T mean = T{} + c.back(), slope{};
+  for (std::size_t k = c.size() - 1; k-- > 0;)
+  {
+    slope = slope * y + mean;
+    mean = mean * y + c[k];
+  }
+  Growth<T> growth{1 + y * mean, mean, slope};
+  const auto is_large = absolute(y) > small_growth;
+  if (!any(is_large))
+    return growth;
+  if constexpr (std::is_same_v<T, double>)
+    return large_growth(y);
+  else
+    for (int l = 0; l < lanes; ++l)
+      if (is_large[l])
+      {
+        const Growth<double> large = large_growth(y[l]);
+        growth.factor[l] = large.factor;
+        growth.mean[l] = large.mean;
+        growth.slope[l] = large.slope;
+      }
+  return growth;
 }
 
 /// A trial deviator s + 2 G e and its q = sqrt(3 J2), where the secant modulus G depends on the end of the increment

@@ -159,6 +159,25 @@ def test_increments_beyond_all_bounds_fail_or_return_to_the_surface():
     assert excess(law, batch.stress[~failed], batch.state[~failed]).max() < 1e-6
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_point_is_updated_alike_alone_and_among_others_with_and_without_tangent(dim):
+    # Elastic, plastic, returned by brackets (the largest increments) and failing (not a number, no pressure), to the last bit
+    stress, strain = random_points(dim, 401, pressure=60e3, deviator=12e3, strain=1.0)
+    strain *= 10 ** np.random.default_rng(2).uniform(-6, -0.5, (401, 1))
+    start = states_of(SAND, stress, LOOSE, overconsolidation=1.3)
+    strain[17, 1], stress[100, :3] = np.nan, 1.0
+    batch = Batch(SAND, stress, strain, start)
+    assert batch.report.failed >= 2 and 100 < batch.report.plastic < 400
+    together, state = stress.copy(), start.copy()
+    report = SAND.update(strain, together, state)
+    assert (report.plastic, report.failed) == (batch.report.plastic, batch.report.failed)
+    for i in range(401):
+        alone, alone_state = stress[i : i + 1].copy(), start[i : i + 1].copy()
+        SAND.update(strain[i : i + 1], alone, alone_state)
+        assert (alone[0] == together[i]).all() and (alone[0] == batch.stress[i]).all()
+        assert (alone_state[0] == state[i]).all() and (alone_state[0] == batch.state[i]).all()
+
+
 @pytest.mark.parametrize("psi", [LOOSE, DENSE])
 def test_plastic_work_is_that_of_friction_and_never_negative(psi):
     # q de_q^p + p de_v^p = p (q/p + M_i / g - q/p) de_q^p = p M_i / g de_q^p; plastic is what the elastic strains, by ln p and by
