@@ -1,65 +1,134 @@
 #include "materials/laws/cam_clay.h"
 
-#include "materials/tools/elasticity.h"
+#include "materials/tools/lode.h"
 #include "materials/tools/root.h"
 #include "materials/tools/secant.h"
+#include "materials/tools/side_by_side.h"
 
 namespace mpm::materials
 {
 namespace
 {
-/// A point at the start of an increment: pressures and volumetric strains are positive in compression here
-template <int D>
+/// The law with the constants of its returns worked out
+struct Clay
+{
+  double shear_ratio;          ///< G / K
+  double slope_squared;        ///< M^2
+  double swelling, difference; ///< kappa and lambda - kappa
+  double volume;               ///< specific volume at the law's start
+  double preconsolidation;     ///< p_c at the law's start, attraction included
+  double attraction;
+};
+
+Clay clay_of(const CamClay& law)
+{
+  return {3 * (1 - 2 * law.poisson) / (2 * (1 + law.poisson)),
+          law.critical_slope * law.critical_slope,
+          law.swelling,
+          law.compression - law.swelling,
+          1 + law.void_ratio,
+          law.preconsolidation + law.attraction,
+          law.attraction};
+}
+
+/// A point at the start of an increment, and the increment: pressures and volumetric strains are positive in
+/// compression here. Numbers of one point or, as `Lanes`, of a few side by side.
+template <class T>
 struct Start
 {
-  double elastic, plastic; ///< v / kappa and v / (lambda - kappa)
-  double shear_ratio;      ///< G / K
-  double slope_squared;    ///< M^2
-  double pressure;         ///< p
-  double preconsolidation; ///< p_c
-  double volumetric;       ///< volumetric strain increment
-  SymTensor<D> deviator;   ///< of the stress
-  SymTensor<D> strain;     ///< deviatoric strain increment, tensor components
+  const Clay& clay;
+  T elastic, plastic;      ///< v / kappa and v / (lambda - kappa)
+  T pressure;              ///< p
+  T preconsolidation;      ///< p_c
+  T volumetric;            ///< volumetric strain increment
+  std::array<T, 3> square; ///< q^2 of the trial deviator s + 2 G e by 2 G, with the secant modulus G
 };
 
 /// What follows from the plastic part x of the volumetric strain and the plastic multiplier m
-template <int D>
+template <class T>
 struct Result
 {
-  double x, multiplier;
-  double y; ///< ln of the growth of the pressure
-  double pressure, preconsolidation;
-  SecantTrial<D> trial;
-  double ratio; ///< of the deviator to that of the trial
+  T x, multiplier;
+  T pressure, preconsolidation;
+  T shear, shear_by_y; ///< G, and its derivative by ln of the growth of the pressure
+  T square;            ///< q^2 of the trial
+  T ratio;             ///< of the deviator to that of the trial
+  T yield;             ///< yield function over the square of p_c at the start
+};
 
-  double yield(double slope_squared) const
+template <class T>
+Result<T> result_of(const Start<T>& a, const T& x, const T& multiplier)
+{
+  const Growth<T> growth = growth_of<T>(a.elastic * (a.volumetric - x)), hardening = growth_of<T>(a.plastic * x);
+  const T modulus = a.clay.shear_ratio * a.elastic * a.pressure, shear = modulus * growth.mean;
+  const T p = a.pressure * growth.factor, pc = a.preconsolidation * hardening.factor;
+  const T square = polynomial<T>(a.square, 2 * shear), ratio = 1 / (1 + 6 * shear * multiplier / a.clay.slope_squared);
+  const T yield = ratio * ratio * square / a.clay.slope_squared + p * (p - pc);
+  return {x,      multiplier, p,
+          pc,     shear,      modulus * growth.slope,
+          square, ratio,      yield / (a.preconsolidation * a.preconsolidation)};
+}
+
+/// The two equations of a return, linearised: flow, x = m (2 p - p_c), and yield = 0
+template <class T>
+struct Linearised
+{
+  T ratio_by_y, ratio_by_m;
+  T yield_by_y; ///< at a fixed p_c
+  T flow_by_x, flow_by_m, yield_by_x, yield_by_m;
+
+  /// Changes of x and m by which the equations change by these
+  std::array<T, 2> solve(const T& flow, const T& yield) const
   {
-    const double q = ratio * trial.q;
-    return q * q / slope_squared + pressure * (pressure - preconsolidation);
+    const T determinant = flow_by_x * yield_by_m - flow_by_m * yield_by_x;
+    return {(flow * yield_by_m - flow_by_m * yield) / determinant,
+            (flow_by_x * yield - yield_by_x * flow) / determinant};
   }
 };
 
-template <int D>
-Result<D> result_of(const Start<D>& a, double x, double multiplier)
+template <class T>
+Linearised<T> linearised(const Start<T>& a, const Result<T>& r)
 {
-  Result<D> r;
-  r.x = x;
-  r.multiplier = multiplier;
-  r.y = a.elastic * (a.volumetric - x);
-  const Growth growth = growth_of(r.y);
-  r.pressure = a.pressure * growth.factor;
-  r.preconsolidation = a.preconsolidation * std::exp(a.plastic * x);
-  r.trial = secant_trial<D>(a.shear_ratio * a.elastic * a.pressure * growth.mean, a.deviator, a.strain);
-  r.ratio = 1 / (1 + 6 * r.trial.shear * multiplier / a.slope_squared);
-  return r;
+  const T &m = r.multiplier, &p = r.pressure, &pc = r.preconsolidation;
+  const T square_by_y = 2 * polynomial_slope<T>(a.square, 2 * r.shear) * r.shear_by_y;
+  const T per_slope = 1 / (T{} + a.clay.slope_squared), per_yield = 1 / (a.preconsolidation * a.preconsolidation);
+  const T by_modulus = -6 * r.ratio * r.ratio * per_slope;
+  const T ratio_by_y = by_modulus * m * r.shear_by_y, ratio_by_m = by_modulus * r.shear;
+  const T by_ratio = 2 * r.ratio * r.square * per_slope;
+  const T yield_by_y =
+      (r.ratio * r.ratio * square_by_y * per_slope + by_ratio * ratio_by_y + (2 * p - pc) * p) * per_yield;
+  return {ratio_by_y,
+          ratio_by_m,
+          yield_by_y,
+          1 + m * (2 * p * a.elastic + pc * a.plastic),
+          pc - 2 * p,
+          -yield_by_y * a.elastic - p * pc * a.plastic * per_yield,
+          by_ratio * ratio_by_m * per_yield};
 }
 
-/// The return, for a point that yields. Between x = 0 and the x at which the critical state is reached, 2 p = p_c, the
-/// multiplier m = x / (2 p - p_c) rises from 0 to infinity, and the deviator falls from the trial one to 0: between
-/// them the yield function has its root. The unknown is the fraction of that x. In small increments the fraction is
-/// small, and the secant method takes a few evaluations; where it does not get there, by bracketing.
-template <int D>
-Result<D> returned(const Start<D>& a)
+/// Newton's method from the elastic result; false where it does not find a result that makes sense. With m above 0,
+/// that is between x = 0 and the critical state.
+/// @param yields  of a few points those that yield; the others stay elastic
+template <class T>
+bool newton(const Start<T>& a, Result<T>& r, const Mask<T>& yields)
+{
+  constexpr double tolerance = 1e-13;
+  for (int iteration = 0; iteration < 15; ++iteration)
+  {
+    const T flow = r.x - r.multiplier * (2 * r.pressure - r.preconsolidation);
+    const Mask<T> is_open = yields & !((absolute(r.yield) <= tolerance) & (absolute<T>(a.elastic * flow) <= tolerance));
+    if (!any(is_open))
+      return !any(Mask<T>(yields & !(r.multiplier > 0)));
+    const auto [x, m] = linearised(a, r).solve(flow, r.yield);
+    r = result_of<T>(a, r.x - (is_open ? x : T{}), r.multiplier - (is_open ? m : T{}));
+  }
+  return false;
+}
+
+/// The same by brackets. Between x = 0 and the x at which the critical state is reached, 2 p = p_c, the multiplier
+/// m = x / (2 p - p_c) rises from 0 to infinity, and the deviator falls from the trial one to 0: between them the yield
+/// function has its root. The unknown is the fraction of that x.
+Result<double> bracketed(const Start<double>& a)
 {
   const double sum = a.elastic + a.plastic;
   const double critical = (std::log(2 * a.pressure / a.preconsolidation) + a.elastic * a.volumetric) / sum;
@@ -69,83 +138,107 @@ Result<D> returned(const Start<D>& a)
     const double pc = a.preconsolidation * std::exp(a.plastic * x);
     return result_of(a, x, fraction / (left * pc * sum * growth_of(sum * critical * left).mean));
   };
-  const double scale = a.preconsolidation * a.preconsolidation;
-  const auto excess = [&](const Result<D>& r) { return r.yield(a.slope_squared) / scale; };
-  const Sample start{0, excess(at(0))};
-  Sample before = start;
-  double fraction = 1e-3;
-  for (int evaluations = 0; evaluations < 8 && fraction > 0 && fraction < 1; ++evaluations)
-  {
-    const Result<D> result = at(fraction);
-    const Sample now{fraction, excess(result)};
-    if (std::abs(now.f) <= 1e-13)
-      return result;
-    fraction -= now.f * (now.x - before.x) / (now.f - before.f);
-    before = now;
-  }
-  return at(root_between([&](double s) { return excess(at(s)); }, start, {1, -1}));
+  return at(root_between([&](double s) { return at(s).yield; }, {0, at(0).yield}, {1, -1}));
 }
 
 /// Derivatives of a result
 /// @param volumetric, trial_q  change of the volumetric strain, and of q of the trial at a fixed shear modulus
-template <int D>
-SecantSlopes slopes(const Start<D>& a, const Result<D>& r, bool plastic, double volumetric, double trial_q)
+SecantSlopes slopes(const Start<double>& a, const Result<double>& r, bool plastic, double volumetric, double trial_q)
 {
-  const double shear_by_y = a.shear_ratio * a.elastic * a.pressure * growth_of(r.y).slope;
   double dx = 0, dm = 0, ratio_by_y = 0, ratio_by_m = 0;
   if (plastic)
   {
-    const double m = r.multiplier, p = r.pressure, pc = r.preconsolidation, m2 = a.slope_squared;
-    const double q_by_y = q_by_shear<D>(r.trial, a.strain) * shear_by_y;
-    ratio_by_y = -r.ratio * r.ratio * 6 * m * shear_by_y / m2;
-    ratio_by_m = -r.ratio * r.ratio * 6 * r.trial.shear / m2;
-    const double per_q = 2 * r.ratio * r.trial.q / m2;
-    const double by_y = per_q * (r.ratio * q_by_y + r.trial.q * ratio_by_y) + (2 * p - pc) * p;
-    // The two equations, x = m (2 p - p_c) and yield = 0, linearised in x and m
-    const double a11 = 1 + m * (2 * p * a.elastic + pc * a.plastic), a12 = -(2 * p - pc);
-    const double a21 = -p * pc * a.plastic - by_y * a.elastic, a22 = per_q * r.trial.q * ratio_by_m;
-    const double b1 = 2 * m * p * a.elastic * volumetric;
-    const double b2 = -by_y * a.elastic * volumetric - per_q * r.ratio * trial_q;
-    const double determinant = a11 * a22 - a12 * a21;
-    dx = (b1 * a22 - a12 * b2) / determinant;
-    dm = (a11 * b2 - a21 * b1) / determinant;
+    const Linearised<double> linear = linearised(a, r);
+    const double flow = 2 * r.multiplier * r.pressure * a.elastic * volumetric;
+    const double by_q = 2 * r.ratio * r.ratio * std::sqrt(std::max(r.square, 0.0)) /
+                        (a.clay.slope_squared * a.preconsolidation * a.preconsolidation);
+    const double yield = -linear.yield_by_y * a.elastic * volumetric - by_q * trial_q;
+    const auto change = linear.solve(flow, yield);
+    dx = change[0];
+    dm = change[1];
+    ratio_by_y = linear.ratio_by_y;
+    ratio_by_m = linear.ratio_by_m;
   }
   const double dy = a.elastic * (volumetric - dx);
-  return {r.pressure * dy, shear_by_y * dy, ratio_by_y * dy + ratio_by_m * dm};
+  return {r.pressure * dy, r.shear_by_y * dy, ratio_by_y * dy + ratio_by_m * dm};
 }
 
-template <int D>
-Start<D> start_of(const CamClay& law, const PointBatch<D>& points, Index i)
+template <int D, class T>
+Start<T> start_of(const Clay& clay, const PointBatch<D>& points, Index i, Deviators<D, T>& deviators)
 {
-  const auto [stress, strain] = tensors_of(points, i);
-  const double volume = (1 + law.void_ratio) * std::exp(points.state[2][i]);
-  return {volume / law.swelling,
-          volume / (law.compression - law.swelling),
-          3 * (1 - 2 * law.poisson) / (2 * (1 + law.poisson)),
-          law.critical_slope * law.critical_slope,
-          law.attraction - mean<D>(stress),
-          (law.preconsolidation + law.attraction) * std::exp(points.state[1][i]),
+  const auto [stress, strain] = tensors_of<D, T>(points, i);
+  deviators = {deviator<D>(stress), deviator<D>(strain)};
+  const auto exponential = [&](std::size_t k)
+  { return each(load_as<T>(points.state[k] + i), [](double x) { return std::exp(x); }); };
+  const T volume = clay.volume * exponential(2);
+  return {clay,
+          volume / clay.swelling,
+          volume / clay.difference,
+          clay.attraction - mean<D>(stress),
+          clay.preconsolidation * exponential(1),
           -3 * mean<D>(strain),
-          deviator<D>(stress),
-          deviator<D>(strain)};
+          square_along<D>(deviators.stress, deviators.strain)};
 }
 
 /// Whether an increment can be worked with: there is pressure, and it stays a number.
-template <int D>
-bool is_sound(const Start<D>& a, const Result<D>& trial)
+template <class T>
+Mask<T> is_sound(const Start<T>& a, const Result<T>& trial)
 {
-  return a.pressure > 0 && is_usable<D>(trial.trial.deviator) && std::isfinite(trial.pressure * trial.pressure) &&
-         std::isfinite(a.preconsolidation * a.preconsolidation) && a.preconsolidation > 0 && std::abs(a.volumetric) < 1;
+  constexpr double most = 1e100; // [Pa] beyond which squares and cubes might overflow
+  return (a.pressure > 0) & (trial.pressure < most) & (trial.square < most * most) & (a.preconsolidation > 0) &
+         (a.preconsolidation < most) & (absolute(a.volumetric) < 1);
+}
+
+/// Whether an elastic result lies outside of the yield surface; a stress that was returned does not.
+template <class T>
+Mask<T> yields(const Result<T>& trial)
+{
+  return trial.yield > 1e-12;
+}
+
+template <int D, class T>
+void write(const Start<T>& a, const Result<T>& r, const Deviators<D, T>& deviators, const PointBatch<D>& points,
+           Index i)
+{
+  write_stress<D, T>(points, i, a.clay.attraction - r.pressure, r.ratio, r.shear, deviators);
+  const T q = root(larger(r.square, T{}));
+  add_to_state<D, T>(points, i, 0, 2 * r.multiplier * r.ratio * q / a.clay.slope_squared);
+  add_to_state<D, T>(points, i, 1, a.plastic * r.x);
+  add_to_state<D, T>(points, i, 2, -a.volumetric);
 }
 
 template <int D>
-void write_point(const CamClay& law, const Start<D>& a, const Result<D>& r, const PointBatch<D>& points, Index i)
+Outcome update_point(const Clay& clay, const PointBatch<D>& points, Index i, double* tangent)
 {
-  for (std::size_t k = 0; k < n_stress<D>; ++k)
-    points.stress[k][i] = r.ratio * r.trial.deviator[k] + (k < 3 ? law.attraction - r.pressure : 0.0);
-  points.state[0][i] += 2 * r.multiplier * r.ratio * r.trial.q / a.slope_squared;
-  points.state[1][i] += a.plastic * r.x;
-  points.state[2][i] -= a.volumetric;
+  Deviators<D, double> deviators;
+  const Start<double> a = start_of(clay, points, i, deviators);
+  const Result<double> trial = result_of(a, 0.0, 0.0);
+  if (!is_sound(a, trial))
+    return Outcome::failed;
+  Result<double> result = trial;
+  const bool plastic = yields(trial);
+  if (plastic && !newton(a, result, true))
+    result = bracketed(a);
+  write(a, result, deviators, points, i);
+  if (tangent)
+    write_secant_tangent<D>(secant_trial<D>(result.shear, deviators.stress, deviators.strain), deviators.strain,
+                            result.ratio, slopes(a, result, plastic, 1, 0), slopes(a, result, plastic, 0, 1), tangent);
+  return plastic ? Outcome::plastic : Outcome::elastic;
+}
+
+template <int D>
+std::optional<Index> update_points(const Clay& clay, const PointBatch<D>& points, Index i)
+{
+  Deviators<D, Lanes> deviators;
+  const Start<Lanes> a = start_of(clay, points, i, deviators);
+  Result<Lanes> result = result_of(a, Lanes{}, Lanes{});
+  if (any(!is_sound(a, result)))
+    return {};
+  const LaneMask plastic = yields(result);
+  if (any(plastic) && !newton(a, result, plastic))
+    return {};
+  write(a, result, deviators, points, i);
+  return count(plastic);
 }
 } // namespace
 
@@ -164,30 +257,10 @@ double shear_modulus(const CamClay& law)
 template <int D>
 BatchReport update(const CamClay& law, const PointBatch<D>& points)
 {
-  constexpr std::size_t entries = n_stress<D> * n_stress<D>;
-  BatchReport report;
-  for (Index i = 0; i < points.size; ++i)
-  {
-    double* const tangent = points.tangent ? points.tangent + static_cast<std::size_t>(i) * entries : nullptr;
-    const Start<D> a = start_of(law, points, i);
-    const Result<D> trial = result_of(a, 0, 0);
-    if (!is_sound(a, trial))
-    {
-      report.failed.push_back(i);
-      if (tangent)
-        std::fill_n(tangent, entries, 0.0);
-      continue;
-    }
-    const double round_off = 1e-12 * a.preconsolidation * a.preconsolidation; // a returned stress counts as elastic
-    const bool plastic = trial.yield(a.slope_squared) > round_off;
-    const Result<D> result = plastic ? returned(a) : trial;
-    report.plastic += plastic ? 1 : 0;
-    write_point(law, a, result, points, i);
-    if (tangent)
-      write_secant_tangent<D>(result.trial, a.strain, result.ratio, slopes(a, result, plastic, 1, 0),
-                              slopes(a, result, plastic, 0, 1), tangent);
-  }
-  return report;
+  const Clay clay = clay_of(law);
+  return update_side_by_side(
+      points, [&](Index i) { return update_points(clay, points, i); },
+      [&](Index i, double* tangent) { return update_point(clay, points, i, tangent); });
 }
 
 template BatchReport update<2>(const CamClay&, const PointBatch<2>&);
