@@ -30,6 +30,19 @@ class Batch:
         return np.stack(columns, axis=2)
 
 
+def assert_alike_alone_and_among_others(law, stress, strain, start):
+    """Points have the same stress and state, to the last bit, by themselves, together, and with a tangent."""
+    batch, together, state = Batch(law, stress, strain, start), stress.copy(), start.copy()
+    report = law.update(strain, together, state)
+    assert (report.plastic, report.failed) == (batch.report.plastic, batch.report.failed)
+    assert (together == batch.stress).all() and (state == batch.state).all()
+    for i in range(len(stress)):
+        alone, alone_state = stress[i : i + 1].copy(), start[i : i + 1].copy()
+        law.update(strain[i : i + 1], alone, alone_state)
+        assert (alone[0] == together[i]).all() and (alone_state[0] == state[i]).all()
+    return report
+
+
 def components(dim):
     return 4 if dim == 2 else 6
 

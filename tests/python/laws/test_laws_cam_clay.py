@@ -2,7 +2,15 @@
 
 import numpy as np
 import pytest
-from law_cases import Batch, assert_tangent, mean_and_radius, random_points, triaxial, walk
+from law_cases import (
+    Batch,
+    assert_alike_alone_and_among_others,
+    assert_tangent,
+    mean_and_radius,
+    random_points,
+    triaxial,
+    walk,
+)
 from scipy.integrate import solve_ivp
 
 import mpm_core as mpm
@@ -125,6 +133,16 @@ def test_huge_increments_return_to_the_surface():
     p, q = p_and_q(batch.stress)
     pc = 100e3 * np.exp(batch.state[:, 1])
     assert np.max((q**2 / M**2 + p * (p - pc)) / (pc**2 + q**2)) < 1e-9
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_point_is_updated_alike_alone_and_among_others_with_and_without_tangent(dim):
+    # Elastic, plastic and failing (not a number, no pressure), with increments up to huge ones
+    stress, strain = random_points(dim, 401, pressure=60e3, deviator=10e3, strain=1.0)
+    strain *= 10 ** np.random.default_rng(2).uniform(-6, -1, (401, 1))
+    strain[17, 1], stress[100, :3] = np.nan, 1.0
+    report = assert_alike_alone_and_among_others(CLAY, stress, strain, np.zeros((401, CLAY.n_state)))
+    assert report.failed >= 2 and 50 < report.plastic < 350
 
 
 def test_initial_stress_inside_is_kept():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bridge_cases import column
-from law_cases import Batch, assert_tangent, random_points, walk
+from law_cases import Batch, assert_alike_alone_and_among_others, assert_tangent, random_points, walk
 from nor_sand_cases import (
     BULK,
     CHI,
@@ -161,21 +161,13 @@ def test_increments_beyond_all_bounds_fail_or_return_to_the_surface():
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_point_is_updated_alike_alone_and_among_others_with_and_without_tangent(dim):
-    # Elastic, plastic, returned by brackets (the largest increments) and failing (not a number, no pressure), to the last bit
+    # Elastic, plastic, returned by brackets (the largest increments) and failing (not a number, no pressure)
     stress, strain = random_points(dim, 401, pressure=60e3, deviator=12e3, strain=1.0)
     strain *= 10 ** np.random.default_rng(2).uniform(-6, -0.5, (401, 1))
     start = states_of(SAND, stress, LOOSE, overconsolidation=1.3)
     strain[17, 1], stress[100, :3] = np.nan, 1.0
-    batch = Batch(SAND, stress, strain, start)
-    assert batch.report.failed >= 2 and 100 < batch.report.plastic < 400
-    together, state = stress.copy(), start.copy()
-    report = SAND.update(strain, together, state)
-    assert (report.plastic, report.failed) == (batch.report.plastic, batch.report.failed)
-    for i in range(401):
-        alone, alone_state = stress[i : i + 1].copy(), start[i : i + 1].copy()
-        SAND.update(strain[i : i + 1], alone, alone_state)
-        assert (alone[0] == together[i]).all() and (alone[0] == batch.stress[i]).all()
-        assert (alone_state[0] == state[i]).all() and (alone_state[0] == batch.state[i]).all()
+    report = assert_alike_alone_and_among_others(SAND, stress, strain, start)
+    assert report.failed >= 2 and 100 < report.plastic < 400
 
 
 @pytest.mark.parametrize("psi", [LOOSE, DENSE])
