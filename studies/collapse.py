@@ -51,7 +51,8 @@ def parser() -> ArgumentParser:
 def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     options = p.parse_args(arguments)
-    check_fem_slope_options(p, options)
+    if options.site is None:
+        check_fem_slope_options(p, options)
     check(p, options.friction_angle < options.angle,
           lambda: f"--friction-angle is {options.friction_angle:g}, expected below --angle, {options.angle:g} degrees: "
                   "a slope that is flatter carries any unit weight")  # fmt: skip

@@ -69,7 +69,8 @@ def parser() -> ArgumentParser:
 def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     options = p.parse_args(arguments)
-    check_fem_slope_options(p, options)
+    if options.site is None:
+        check_fem_slope_options(p, options)
     check(p, options.site is not None or not options.unreduced,
           lambda: f"--unreduced names {', '.join(options.unreduced)}, expected --site: the slope has one soil")  # fmt: skip
     check(p, options.depth == 0 or not options.particles,
@@ -167,10 +168,12 @@ def main(arguments: list[str] | None = None) -> int:
 
         def factor(site, model, progress):
             unreduced = site.tags_of(a.unreduced)
-            return bridge.factor_of_safety(model, site.load(), start=a.start, progress=progress, unreduced=unreduced)
+            load = bridge.FemSite(model).place(site.stages) if site.stages else site.load()
+            return bridge.factor_of_safety(model, load, start=a.start, progress=progress, unreduced=unreduced)
 
         return site_study(a, factor, "factor_of_safety", "Factor of safety [-]",
-                          lambda site: particle_summary(site_by_particles(a, site)) if a.particles else {})  # fmt: skip
+                          lambda site: particle_summary(site_by_particles(a, site)) if a.particles else {},
+                          at_once=a.particles)  # fmt: skip
     start = perf_counter()
     folder = open_results(a, comm)
     limit = bridge.log_spiral_safety(a.height, a.angle, a.cohesion, a.friction_angle, a.unit_weight, depth=a.depth)

@@ -130,7 +130,8 @@ def parser() -> ArgumentParser:
 def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     options = p.parse_args(arguments)
-    check_slope_options(p, options)
+    if options.site is None:
+        check_slope_options(p, options)
     if options.integration is None:
         stable = stable_integration(options.particles_per_cell, options.cohesion > 0)
         options.integration = "particles" if options.paper else stable

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from fenics_bridge.fem.loads import Load
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport
 from fenics_bridge.mesh.names import known_tags, label, tag_numbers
+from fenics_bridge.types import OfPosition
 
 
 class FemSite:
@@ -89,18 +90,45 @@ class FemSite:
         state, _, _ = self.state.after(stage)
         if stage.reset_displacement:
             fem.reset_displacement()
-        laws = self._laws(state)
-        off = tuple(sorted(self._every.difference(state.there)))
-        fem.reconfigure(off, state.supports, state.pore_pressure, stage.stress, laws)
-        self.state = state
-        moved = any(v for s in state.supports for v in (s.displacement or ()) if v)
-        goal = Load({tag: state.unit_weight[tag] for tag in state.there}, state.pressure, float(moved))
-        steps = fem.solve(goal, **self._options)
+        steps = fem.solve(self._enter(state, stage.stress), **self._options)
         self.number += 1
         if not fem.converged:
             raise StageError(self._failure(stage, steps), 1.0 - fem.load.held)
         iterations = sum(step.report.iterations for step in steps)
         return StageReport(self.number, stage.name, len(steps), iterations, self.largest_displacement())
+
+    def place(self, stages: Iterable[Stage]) -> Load:
+        """Bring the soils, laws, supports and water after some stages at once, without the stresses of the stages. Collective.
+
+        It is for the factor of safety, which hardly depends on the stresses before failure, also of ground that does not carry its
+        weight and in which therefore no stage has an equilibrium.
+
+        Args:
+            stages: the stages from the beginning on; at least one.
+
+        Returns:
+            The load after the last one, for `factor_of_safety`. It does not act yet.
+
+        Raises:
+            InputError: there is no stage, one was carried out before, or one has an unknown soil or boundary or prescribes a
+                displacement. Raised on all ranks alike.
+
+        Example:
+            >>> site = bridge.FemSite(fem)
+            >>> safety = bridge.factor_of_safety(fem, site.place(stages))
+        """
+        comm, state, number = self.fem.domain.comm, self.state, 0
+        agree(comm, f"stage {self.number} has been carried out, expected a new site" if self.number else None)
+        for number, stage in enumerate(stages, start=1):
+            state, _, _ = state.after(stage)
+            moved = any(v for support in stage.support for v in (support.displacement or ()))
+            agree(
+                comm,
+                f"stage {stage.name!r}: support prescribes a displacement: carry_out applies it" if moved else None,
+            )
+        agree(comm, None if number else "stages is empty, expected those of the site")
+        self.number = number
+        return self._enter(state)
 
     def largest_displacement(self) -> float:
         """Largest displacement of a node of the present soil, since displacements count [m]. Collective."""
@@ -108,6 +136,14 @@ class FemSite:
         points, space = self.fem.points, self.fem.displacement.function_space
         there = cell_dofs(space)[points.cells[points.material >= 0]].ravel()
         return max(self.fem.domain.comm.allgather(float(size[there].max(initial=0.0))))
+
+    def _enter(self, state: SiteState, stress: OfPosition | None = None) -> Load:
+        """Change the body to a state; returns the state's load, which does not act yet. stress: of soils that are placed."""
+        off = tuple(sorted(self._every.difference(state.there)))
+        self.fem.reconfigure(off, state.supports, state.pore_pressure, stress, self._laws(state))
+        self.state = state
+        moved = any(v for s in state.supports for v in (s.displacement or ()) if v)
+        return Load({tag: state.unit_weight[tag] for tag in state.there}, state.pressure, float(moved))
 
     def _laws(self, state: SiteState) -> Any:
         """The present laws, by tag: those of the stage, otherwise those that the body had before."""

@@ -93,21 +93,33 @@ def gathered(function: object, half_section: bool = False, parts: int = 1) -> Fi
     return Field(corners[first], number.reshape(-1, 3), at_corners[first], half_section)
 
 
-def mechanism_field(mechanism: object, half_section: bool = False, soils: object = None) -> Field | None:
+def mechanism_field(
+    mechanism: object, half_section: bool = False, soils: object = None, off: Sequence[int] = ()
+) -> Field | None:
     """A mechanism at all nodes of its elements, so that elements of higher degree show what moves within them. Collective.
 
-    soils: tags of the cells, by name, whose borders are shown
+    soils: tags of the cells, by name, whose borders are shown; off: those of them whose cells are not there
     """
     nodes = mechanism.function_space.dofmap.dof_layout.num_dofs
-    field = gathered(mechanism, half_section, parts=round((np.sqrt(8 * nodes + 1) - 3) / 2))
-    borders = None if soils is None else soil_borders(mechanism.function_space.mesh, soils)
-    return None if field is None else replace(field, borders=borders)
+    parts = round((np.sqrt(8 * nodes + 1) - 3) / 2)
+    field = gathered(mechanism, half_section, parts)
+    if soils is None:
+        return field
+    domain = mechanism.function_space.mesh
+    borders, mesh = soil_borders(domain, soils, off), bridge.background_arrays(domain, soils)
+    there = domain.comm.gather(~np.isin(mesh["cell_tags"][mesh["cell_owners"] == domain.comm.rank], off))
+    if field is None or there is None:
+        return None
+    return replace(field, cells=field.cells[np.repeat(np.concatenate(there), parts**2)], borders=borders)
 
 
-def soil_borders(domain: object, cell_tags: object) -> np.ndarray | None:
-    """Sides of cells around each soil with a name: segments (k, 2, 2) [m]; None but on the first rank. Collective."""
+def soil_borders(domain: object, cell_tags: object, off: Sequence[int] = ()) -> np.ndarray | None:
+    """Sides of cells around each soil with a name: segments (k, 2, 2) [m]; None but on the first rank. Collective.
+
+    off: tags of the soils that are not there
+    """
     mesh = bridge.background_arrays(domain, cell_tags)
-    own = mesh["cell_owners"] == domain.comm.rank
+    own = (mesh["cell_owners"] == domain.comm.rank) & ~np.isin(mesh["cell_tags"], off)
     parts = domain.comm.gather((mesh["points"][mesh["cells"][own]], mesh["cell_tags"][own]))
     if parts is None:
         return None

@@ -139,8 +139,8 @@ class Site:
         if not found:
             return ""
         return (
-            f"all soils are there at once, and what the stages of the site change is left out: {', '.join(found)}; in a script "
-            "bridge.carry_out and then bridge.factor_of_safety take it into account (docs/howto/stages.md)"
+            f"all soils are there at once, and what the stages of the site change is left out: {', '.join(found)}; the study safety "
+            "takes it into account in its factor by finite elements, and the study embankment in a slide (docs/howto/stages.md)"
         )
 
     def tags_of(self, soils: Sequence[str]) -> list[int]:
@@ -206,8 +206,8 @@ def unit_weight_of(soil: dict, where: str) -> float:
     """Unit weight [N/m3] in the table of a soil; where: it stands, for messages."""
     if "unit_weight" not in soil:
         raise mpm.InputError(f"{where} has no unit_weight [N/m3]")
-    if not is_number(soil["unit_weight"]):
-        raise mpm.InputError(f"{where}: unit_weight is {soil['unit_weight']!r}, expected a number [N/m3]")
+    if not is_number(soil["unit_weight"]) or soil["unit_weight"] < 0:
+        raise mpm.InputError(f"{where}: unit_weight is {soil['unit_weight']!r}, expected a number from 0 on [N/m3]")
     return float(soil["unit_weight"])
 
 

@@ -25,7 +25,8 @@ from .summary import write_summary
 def add_site_option(parser: argparse.ArgumentParser) -> None:
     """Option ``--site``."""
     parser.add_argument("--site", type=Path, default=None, metavar="FILE", help="TOML file of a mesh and its soils by name, such "
-                        "as meshes/embankment.toml, instead of the slope and its options")  # fmt: skip
+                        "as meshes/embankment.toml, instead of the slope and its options; --cell-size instead of the one of "
+                        "the file may be given")  # fmt: skip
 
 
 def check_site_options(parser: argparse.ArgumentParser, options: Namespace, names: set[str]) -> None:
@@ -34,7 +35,7 @@ def check_site_options(parser: argparse.ArgumentParser, options: Namespace, name
     Args:
         names: of the options that it has, without dashes, besides those of the results.
     """
-    kept = {f"--{name}" for name in (*names, "site", "output", "overwrite", "parameters")}
+    kept = {f"--{name}" for name in (*names, "cell-size", "site", "output", "overwrite", "parameters")}
     others = [name for name in sorted(options.given) if name.replace("--no-", "--") not in kept]
     check_effect(parser, options, options.site is None, others, "no --site")
 
@@ -45,6 +46,7 @@ def site_study(
     name: str,
     label: str,
     more: Callable[[Site], dict] = lambda site: {},
+    at_once: bool = True,
 ) -> int:
     """A study on a site instead of the slope; returns its exit code. Collective.
 
@@ -53,10 +55,11 @@ def site_study(
         find: function of the site, its elements (unloaded) and a progress that gives the last equilibrium.
         name: of the value in the summary; label: of its axis, with unit.
         more: function of the site on the finest mesh that returns further entries of the summary.
+        at_once: whether anything of it has all soils at once, without what stages change, so that a warning is due.
     """
     comm, start = MPI.COMM_WORLD, perf_counter()
     folder = open_results(a, comm)
-    finest = cell_size_of(a.site)
+    finest = a.cell_size or cell_size_of(a.site)
     sizes = [finest * 2**k for k in reversed(range(a.meshes))] if finest else [None]
     runs = []
     for size in sizes:
@@ -65,7 +68,8 @@ def site_study(
         progress = step_line(f"{cells}, {label[0].lower()}{label[1:]}")
         model = site.finite_elements(**finite_elements(a))
         runs.append(find(site, model, progress))
-    say(site.left_out_at_once())
+    if at_once:
+        say(site.left_out_at_once())
     rows = [{"cell_size_m": size, name: run.value, "failed_at": run.failed_at, "failure_shown": run.failed,
              "reason": run.reason, "largest_missing_stress_fraction": run.missing, "largest_displacement_m": run.curve[-1, 1]}
             for size, run in zip(sizes, runs)]  # fmt: skip
@@ -77,16 +81,16 @@ def site_study(
         sure = "" if row["failure_shown"] else f", a lower bound only: {row['reason']}"
         cells = "mesh of the site" if row["cell_size_m"] is None else f"cells of {row['cell_size_m']:g} m"
         said.append(f"{cells}: {name.replace('_', ' ')} {row[name]:.3f}{sure}")
-    drawn = _drawn(folder, sizes, runs, label, site.axisymmetric, model.cell_tags)
+    drawn = _drawn(folder, sizes, runs, label, site.axisymmetric, model)
     write_summary(folder, a, summary, comm, pictures=drawn, said="\n".join(said))
     return 0 if all(run.failed for run in runs) else UNDECIDED
 
 
 def _drawn(
-    folder: Path, sizes: list, runs: list[bridge.Collapse], label: str, half_section: bool, soils: object
+    folder: Path, sizes: list, runs: list[bridge.Collapse], label: str, half_section: bool, model: bridge.QuasiStatic
 ) -> Pictures:
     """Mechanism on the finest mesh, displacement over the value, and convergence. Collective."""
-    field = mechanism_field(runs[-1].mechanism, half_section, soils)
+    field = mechanism_field(runs[-1].mechanism, half_section, model.cell_tags, model.off)
     if field is None:
         return {}
     names = ["site" if size is None else f"{size:g} m" for size in sizes]

@@ -167,7 +167,7 @@ def site_slide(a: Namespace) -> int:
     """
     start = perf_counter()
     folder = open_results(a, comm)
-    site = read_site(a.site, comm)
+    site = read_site(a.site, comm, a.cell_size)
     say(site.left_out_at_once())
     nmd = averages(a, site.laws.values())
     fem = site.finite_elements(1, nmd=nmd, solver=bridge.Solver(tolerance=1e-10), as_particles=nmd)

@@ -53,6 +53,23 @@ def test_borders_of_soils_are_the_sides_around_them(tmp_path):
     assert np.linalg.norm(edges, axis=1).sum() == pytest.approx(6.0)
 
 
+def test_a_mechanism_is_not_shown_where_the_soil_was_dug_away():
+    function = of_degree(2)
+    domain = function.function_space.mesh
+    soils = meshtags(domain, 2, np.arange(16, dtype=np.int32), np.repeat(np.array([1, 2], np.int32), 8))
+    bridge.name_tags(soils, {"ground": 1, "cut": 2})
+    whole, left = (mechanism_field(function, False, soils, off) for off in ((), [2]))
+    mesh = bridge.background_arrays(domain, soils)
+    ground = mesh["points"][mesh["cells"][mesh["cell_tags"] == 1]]
+    assert len(whole.cells) == 16 * 4 and len(left.cells) == 8 * 4
+    corners = left.points[left.cells].reshape(-1, 2)
+    assert np.allclose(
+        corners.mean(axis=0), ground.reshape(-1, 2).mean(axis=0)
+    )  # the middle of the cells that are there
+    lengths = [np.linalg.norm(np.diff(edges, axis=1)) for edges in (left.borders, soil_borders(domain, soils, [2]))]
+    assert lengths[0] == lengths[1] and len(left.borders) < len(whole.borders)
+
+
 def test_displacements_of_a_stage_are_those_of_its_points():
     """As means of cells those of triangles with two corners on a fixed base and of others alternate in a picture."""
     field = gathered(of_degree(1))

@@ -3,6 +3,7 @@
 import importlib
 import json
 import sys
+import warnings
 from pathlib import Path
 
 import pytest
@@ -107,7 +108,8 @@ def test_a_site_may_be_a_half_section(tmp_path):
         ("cell_size = 0.5", 'cell_size = 0.5\nstages = [{fill = ["sand"]}]', "soil 'sand' is not among the soils lower, upper"),
         ("cell_size = 0.5", "cell_size = 0.5\nstages = [{full = []}]", r"stages\[0\]: unknown key 'full'"),
         ("cell_size = 0.5", "cell_size = [", "is not TOML"),
-        ("unit_weight = 18e3", 'unit_weight = "18e3"', r"soils.upper: unit_weight is '18e3', expected a number \[N/m3\]"),
+        ("unit_weight = 18e3", 'unit_weight = "18e3"', r"soils.upper: unit_weight is '18e3', expected a number from 0 on \[N/m3\]"),
+        ("unit_weight = 18e3", "unit_weight = -18e3", r"soils.upper: unit_weight is -18000.0, expected a number from 0 on"),
         ("per_metre = 10e3", 'per_metre = "10e3"', "soils.lower: shear_strength is .* expected {value = , per_metre = , top = }"),
         ("cell_size = 0.5", 'cell_size = 0.5\nstages = [{reset_displacement = "false"}]', "reset_displacement is 'false', expected true"),
         ("cell_size = 0.5", 'cell_size = 0.5\nstages = [{water_level = "low"}]', "water_level is 'low', expected a number"),
@@ -155,19 +157,65 @@ release = "left"
 
 
 def test_stages_that_are_left_out_are_named(tmp_path):
-    options = [
-        "--site",
-        site_in(tmp_path, SITE + STAGES),
-        "--meshes",
-        1,
-        "--output",
-        tmp_path / "safety",
-    ]
-    said = "left out: water_level of 'in situ', excavate of 'cut', unit_weight of 'cut', release of 'cut'; in a script"
+    options = ["--site", site_in(tmp_path, SITE + STAGES), "--meshes", 1, "--output", tmp_path / "collapse"]
+    said = "left out: water_level of 'in situ', excavate of 'cut', unit_weight of 'cut', release of 'cut'; the study safety"
     with pytest.warns(RuntimeWarning, match=said):
-        importlib.import_module("safety").main([str(word) for word in options])
+        importlib.import_module("collapse").main([str(word) for word in options])
     placed = SITE + STAGES.partition("water_level")[0]
     assert site_file.read_site(site_in(tmp_path, placed), MPI.COMM_SELF).left_out_at_once() == ""
+
+
+def test_the_factor_of_safety_is_that_after_the_last_stage(tmp_path):
+    """Ground far below a water level has the factor of dry ground under its buoyant weight: water at rest presses on all sides.
+
+    A block under 2 m of water, whose upper half was dug away, is therefore the lower half with its weight less 9.81 kN/m3, in the
+    same cells. It does not carry its own weight, so that the first stage has no equilibrium.
+    """
+    heavy = SITE.replace("20e3, per_metre = 10e3", "1e3, per_metre = 0.5e3").replace("10e3", "19.81e3")
+    staged = (
+        heavy
+        + """
+[[stages]]
+fill = ["lower", "upper"]
+water_level = 4.0
+[[stages]]
+excavate = "upper"
+"""
+    )
+    lower = heavy.partition("[soils.upper]")[0].replace("19.81e3", "10e3")
+    factors = []
+    for name, text in (("staged", staged), ("lower", lower)):
+        options = ["--site", site_in(tmp_path, text), "--meshes", 1, "--start", 0.2, "--output", tmp_path / name]
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", message="all soils are there at once")
+            assert importlib.import_module("safety").main([str(word) for word in options]) == 0
+        factors.append(json.loads((tmp_path / name / "summary.json").read_text())["factor_of_safety"])
+    assert 0.2 < factors[1] < 1.0
+    assert factors[0] == pytest.approx(factors[1], rel=4e-3)  # twice the tolerance of the search
+
+
+def test_stages_are_placed_at_once_on_a_new_site_only(tmp_path):
+    site = site_file.read_site(site_in(tmp_path, SITE + STAGES), MPI.COMM_WORLD)
+    once = bridge.FemSite(site.finite_elements(1))
+    with pytest.raises(mpm.InputError, match="stages is empty"):
+        once.place([])
+    pull = bridge.Stage("pull", support=bridge.prescribed("left", (-0.01, None)))
+    with pytest.raises(mpm.InputError, match="stage 'pull': support prescribes a displacement"):
+        once.place([site.stages[0], pull])
+    load = once.place(site.stages)
+    assert once.state.there == tuple(sorted(site.tags_of(["lower"]))) and set(load.unit_weight.values()) == {11e3}
+    with pytest.raises(mpm.InputError, match="stage 2 has been carried out"):
+        once.place(site.stages)
+
+
+def test_the_cell_size_of_a_site_may_be_given_beside_it(tmp_path):
+    path = site_in(tmp_path, SITE)
+    options = ["--site", path, "--cell-size", 1.0, "--meshes", 1]
+    for study in ("safety", "collapse"):
+        folder = tmp_path / study
+        assert importlib.import_module(study).main([str(word) for word in [*options, "--output", folder]]) == 0
+        assert json.loads((folder / "summary.json").read_text())["meshes"][0]["cell_size_m"] == 1.0
+    assert importlib.import_module("slope").parse(["--site", str(path), "--cell-size", "2.5"]).cell_size == 2.5
 
 
 def test_a_soil_of_a_site_may_keep_its_strength(tmp_path):
