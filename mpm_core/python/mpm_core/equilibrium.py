@@ -83,6 +83,8 @@ def _found_equilibrium(model: Model, solver: Any, options: Any, tolerance: float
                 raise error
         applied = min(1.0, applied + part)
         if applied < 1.0:
+            if model.report().unbalanced_ratio <= tolerance:
+                return stepper.report()  # near collapse a step may find no equilibrium of what is nothing to speak of
             if stepper.last.easy:
                 control.grow()
             continue

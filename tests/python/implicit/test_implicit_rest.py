@@ -61,6 +61,16 @@ def test_equilibrate_applies_the_loads_in_parts_and_says_how_far_it_came():
     assert 20e3 < part * 80e3 < 45e3
 
 
+def test_an_equilibration_ends_where_the_rest_of_the_loads_is_below_the_tolerance():
+    """The slope carries a quarter to a half of its weight (above), so three quarters out of balance at most can be reached."""
+    model = slope(0.2)
+    report = model.equilibrate(tolerance=0.8, max_steps=100, integration=mpm.Integration.PARTICLES)
+    assert 0.4 < report.unbalanced_ratio <= 0.8
+    assert report.unbalanced_ratio == pytest.approx(
+        model.out_of_balance(integration=mpm.Integration.PARTICLES), rel=0.02
+    )
+
+
 def test_an_interrupted_equilibration_leaves_the_time_as_it_was(monkeypatch):
     """A step without duration ends at the present time, so that it begins before it."""
 
