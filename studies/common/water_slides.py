@@ -60,7 +60,13 @@ def slide_of(
     """
     failing = [instant for instant in instants if instant.safety.value < 1.0]
     instant = failing[0] if a.slide_from == "failure" else lowest(failing)
-    model, handover, act = handed_over(a, slope, instant)
+    try:
+        model, handover, act = handed_over(a, slope, instant)
+    except mpm.RunError as error:  # the factors of safety remain
+        reason = f"no start of the slide from {in_days(instant.time)} on: {error}"
+        if comm.rank == 0:
+            print(f"{reason}; another --slide-from or --cell-size may have one", file=sys.stderr)
+        return {"slide_stopped_because": reason}, [], {}, 1
     scene = scene_of(model, sorted(slope.site.laws))
     step = None
     if a.slide_water == "flows":

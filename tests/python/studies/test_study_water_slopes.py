@@ -132,3 +132,15 @@ def test_a_site_without_rain_is_refused(tmp_path):
     path = site("rain", tmp_path, (f"rain = {TABLE}", "seepage_face = true"))
     with pytest.raises(InputError, match="no boundary has rain"):
         run("rain", path, tmp_path, "--days 1")
+
+
+def test_factors_of_safety_are_not_lost_with_a_slide_that_cannot_start(tmp_path, monkeypatch, capsys):
+    slides = importlib.import_module("common.water_slides")
+    monkeypatch.setattr(slides, "HOLDING", ())
+    path = site("drawdown", tmp_path, ("friction_angle = 27.0", "friction_angle = 20.0"))
+    arguments = f"{SMALL} --days 3 --slide --no-pictures --site {path} --output {tmp_path / 'results'}"
+    assert importlib.import_module("drawdown").main(arguments.split()) == 1
+    summary = json.loads((tmp_path / "results" / "summary.json").read_text())
+    assert summary["lowest_factor_of_safety"] < 1
+    assert "the particles find no initial equilibrium" in summary["slide_stopped_because"]
+    assert "another --slide-from or --cell-size" in capsys.readouterr().err
