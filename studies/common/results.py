@@ -19,7 +19,7 @@ from typing import Any, TextIO
 from mpi4py import MPI
 from mpm_core.collective import on_first_rank
 
-from .files import IN_SOURCES, NOT_WRITTEN, ROOT, OutputError
+from .files import IN_SOURCES, NOT_WRITTEN, ROOT, OutputError, written_whole
 from .options import Options
 from .parameters import write_parameters
 
@@ -35,6 +35,8 @@ _locks: dict[Path, TextIO] = {}
 
 def open_results(options: Options, comm: MPI.Comm = MPI.COMM_WORLD, *, adds: bool = False) -> Path:
     """The folder for the results of a run, locked until the process ends, with ``parameters.toml`` in it. Collective.
+
+    Of a run with ``--site`` it also has ``site.toml``, a copy of that file as it is now, since sites are changed from run to run.
 
     Without ``--output`` it is ``results/NAME`` of the repository (of the present folder for an installed package), or where that
     holds a run, ``results/NAME-2`` and so on. A folder named by ``--output`` that holds results is refused, unless
@@ -53,6 +55,10 @@ def open_results(options: Options, comm: MPI.Comm = MPI.COMM_WORLD, *, adds: boo
     def opened() -> Path:
         folder = _opened(options, adds)
         write_parameters(folder / "parameters.toml", options.parameters(), options.study, options.restarts)
+        site = getattr(options, "site", None)
+        if site is not None and site.is_file():  # if there is none, the study says so
+            with written_whole(folder / "site.toml") as aside:
+                shutil.copyfile(site, aside)
         return folder
 
     folder = comm.bcast(on_first_rank(comm, opened, OutputError))

@@ -208,6 +208,16 @@ def test_stages_are_placed_at_once_on_a_new_site_only(tmp_path):
         once.place(site.stages)
 
 
+def test_results_keep_the_file_of_the_site_as_it_was(tmp_path):
+    path = site_in(tmp_path, SITE.replace("cell_size = 0.5", "cell_size = 1.0  # coarse"))
+    text, options = path.read_text(), ["--site", str(path), "--meshes", "1", "--output", str(tmp_path / "results")]
+    assert importlib.import_module("safety").main(options) == 0
+    path.write_text(SITE.replace("18e3", "20e3"))
+    assert (tmp_path / "results" / "site.toml").read_text() == text
+    assert importlib.import_module("safety").main([*options, "--overwrite"]) == 0
+    assert (tmp_path / "results" / "site.toml").read_text() == path.read_text()
+
+
 def test_the_cell_size_of_a_site_may_be_given_beside_it(tmp_path):
     path = site_in(tmp_path, SITE)
     options = ["--site", path, "--cell-size", 1.0, "--meshes", 1]
