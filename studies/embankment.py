@@ -51,7 +51,7 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     add_stage_options(p, "embankment", "P1")
     add_strength_factor(p)
-    site_slides.add_slide_options(p, damping=0.05, pic=0.1)
+    site_slides.add_slide_options(p, damping=0.01, pic=0.002)
     return p
 
 

@@ -175,6 +175,9 @@ def choose_slide(p: ArgumentParser, options: Namespace) -> None:
         options.time = 34.8 if as_in_paper else 16.0 * slowness
     if options.viscosity is None:
         options.viscosity = 1e3 * options.unit_weight / 80e3 * options.height * slowness
+    if options.site is not None:  # a run-out in earnest, which damping would shorten (docs/howto/switches.md)
+        options.damping = 0.01 if options.damping is None else options.damping
+        options.pic = 0.002 if options.pic is None else options.pic
     choose_damping(p, options, local=as_in_paper, mass=5.0 / slowness)
 
 

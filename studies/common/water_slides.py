@@ -46,7 +46,7 @@ def add_optional_slide(parser: ArgumentParser) -> None:
     add_choice(p, "--slide-water", "still", ("still", "flows"), "still: pore pressures remain fixed in space as they are at "
                "failure; flows: water flows through the particles and drains at their surface, by implicit steps")  # fmt: skip
     add_number(p, "--slide-step", 0.02, "s", "longest time step of a slide in which water flows", above=0)
-    add_slide_options(p, damping=0.0, pic=0.01)
+    add_slide_options(p, damping=0.0, pic=0.002)
 
 
 def slide_of(

@@ -6,6 +6,7 @@ import sys
 import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
@@ -301,6 +302,26 @@ def test_a_site_slides_when_its_strength_is_reduced(tmp_path):
     settlement = (18e3 * 2 + 10e3 * 2**2 / 2) / lower + 18e3 / 2 / upper
     assert max(moved[1.2, "--no-nmd"], moved[1.2, "--nmd"]) < 1e-5 * settlement
     assert 0.05 < moved[8.0, ""] < 9.81 / 2 * 0.4**2
+
+
+@pytest.mark.parametrize("study", ["slope", "embankment"])
+def test_numerical_damping_hardly_brakes_the_slide_of_a_site(tmp_path, study):
+    """Both studies move a site as far as without any damping, to some percent, not by a part that depends on the study."""
+    stages = '[[stages]]\nname = "all"\nfill = ["lower", "upper"]\n'
+    path = site_in(tmp_path, SITE.replace("9e3", "36e3") + stages)
+    (tmp_path / "block.geo").write_text(
+        BLOCK.replace("Coherence;", WITH_AIR).replace("-e, 1 + e, e, e}", "-e, 3 + e, e, e}")
+    )
+    moved = []
+    for damping in ("", "--damping 0 --pic 0"):
+        folder = tmp_path / f"results{len(moved)}"
+        options = (
+            f"--site {path} --cell-size 0.25 --factor 8 --time 0.5 --frames 2 --no-pictures {damping} --output {folder}"
+        )
+        assert importlib.import_module(study).main(options.split()) == 0
+        history = np.genfromtxt(folder / "history.csv", delimiter=",", names=True)
+        moved.append(history["largest_displacement_m"][-1])
+    assert moved[1] > 0.2 and moved[0] == pytest.approx(moved[1], rel=0.05)
 
 
 def test_a_site_that_does_not_carry_its_weight_does_not_slide(tmp_path):

@@ -144,3 +144,14 @@ def test_factors_of_safety_are_not_lost_with_a_slide_that_cannot_start(tmp_path,
     assert summary["lowest_factor_of_safety"] < 1
     assert "the particles find no initial equilibrium" in summary["slide_stopped_because"]
     assert "another --slide-from or --cell-size" in capsys.readouterr().err
+
+
+def test_pic_hardly_brakes_the_slide(tmp_path):
+    """The bank slides as far as without PIC, to some percent."""
+    path, moved = site("drawdown", tmp_path, ("friction_angle = 27.0", "friction_angle = 16.0")), []
+    for pic in ("", "--pic 0"):
+        folder = tmp_path / f"{len(moved)}"
+        folder.mkdir()
+        options = f"--cell-size 1.6 --days 3 --slide --slide-from lowest --time 3 --frames 2 --no-pictures {pic}"
+        moved.append(run("drawdown", path, folder, options)[0]["largest_displacement_m"])
+    assert moved[1] > 1 and moved[0] == pytest.approx(moved[1], rel=0.1)
