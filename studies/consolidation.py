@@ -258,8 +258,8 @@ CAPTIONS = {
 def main(arguments: list[str] | None = None) -> int:
     a: Namespace = parser().parse_args(arguments)
     start = perf_counter()
-    folder = open_results(a, comm)
     site = read_consolidation_site(a.site, comm, a.cell_size, pressures_of(a.pressures or []))
+    folder = open_results(a, comm)
     model = site.at_rest(ELEMENTS[a.elements], a.nmd and a.elements == "P1-P1")
     with ExitStack() as stack:
         particles = None

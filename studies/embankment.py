@@ -116,8 +116,8 @@ def pore_water(particles: bridge.ParticleSite) -> Callable[[], None]:
 def main(arguments: list[str] | None = None) -> int:
     a = parser().parse_args(arguments)
     start = perf_counter()
-    folder = open_results(a, comm)
     site = read_site(a.site, comm, a.cell_size)
+    folder = open_results(a, comm)
     degree, averaged = int(a.elements[1]), site_slides.averages(a, site.laws.values())
     staged, rows, pictures, failed = carry_out(site, degree, folder, comm, nmd=averaged and degree == 1)
     built = perf_counter()

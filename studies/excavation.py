@@ -81,8 +81,8 @@ def comparison(site: Site, staged: bridge.FemSite) -> dict[str, float | None]:
 def main(arguments: list[str] | None = None) -> int:
     a: Namespace = parser().parse_args(arguments)
     start = perf_counter()
-    folder = open_results(a, comm)
     site = read_site(a.site, comm, a.cell_size)
+    folder = open_results(a, comm)
     staged, rows, pictures, stopped = carry_out(site, int(a.elements[1]), folder, comm)
     compared = comparison(site, staged) if a.compare and stopped is None else {}
     last = rows[-1] if rows else {}

@@ -152,8 +152,8 @@ CAPTIONS = {
 def main(arguments: list[str] | None = None) -> int:
     a: Namespace = parser().parse_args(arguments)
     start = perf_counter()
-    folder = open_results(a, comm)
     site = read_water_site(a.site, comm, a.cell_size)
+    folder = open_results(a, comm)
     flow = site.seepage(int(a.elements[1]))
     names = [c.facet_tag for c in site.boundary]
     flow.solve()

@@ -58,12 +58,12 @@ def site_study(
         at_once: whether anything of it has all soils at once, without what stages change, so that a warning is due.
     """
     comm, start = MPI.COMM_WORLD, perf_counter()
-    folder = open_results(a, comm)
     finest = a.cell_size or cell_size_of(a.site)
     sizes = [finest * 2**k for k in reversed(range(a.meshes))] if finest else [None]
-    runs = []
+    site, runs = read_site(a.site, comm, sizes[0]), []
+    folder = open_results(a, comm)
     for size in sizes:
-        site = read_site(a.site, comm, size)
+        site = site if size == sizes[0] else read_site(a.site, comm, size)
         cells = "site" if size is None else f"cells of {size:g} m"
         progress = step_line(f"{cells}, {label[0].lower()}{label[1:]}")
         model = site.finite_elements(**finite_elements(a))

@@ -166,8 +166,8 @@ def site_slide(a: Namespace) -> int:
         a: options with site, factor, particles_per_cell and those of `slide`.
     """
     start = perf_counter()
-    folder = open_results(a, comm)
     site = read_site(a.site, comm, a.cell_size)
+    folder = open_results(a, comm)
     say(site.left_out_at_once())
     nmd = averages(a, site.laws.values())
     fem = site.finite_elements(1, nmd=nmd, solver=bridge.Solver(tolerance=1e-10), as_particles=nmd)

@@ -41,12 +41,12 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
         InputError: the site has no such boundary condition, or a slide in which water flows could not have its reservoirs.
     """
     start = perf_counter()
-    folder = open_results(a, comm)
     slope = read_slope_site(a.site, comm, a.cell_size, a.slower)
     if not any(isinstance(condition, changing) for condition in slope.boundary):
         raise mpm.InputError(f"{a.site}: no boundary has {changing.__name__.lower()}, expected one or more")
     if a.slide and a.slide_water == "flows":
         require_one_level(slope, DAY * a.days)
+    folder = open_results(a, comm)
     flow = slope.seepage()
     flow.solve()
     limits = limits_of(a, slope, flow)

@@ -304,6 +304,17 @@ def test_a_site_slides_when_its_strength_is_reduced(tmp_path):
     assert 0.05 < moved[8.0, ""] < 9.81 / 2 * 0.4**2
 
 
+@pytest.mark.parametrize("study", ["collapse", "consolidation", "drawdown", "embankment", "excavation", "rain", "safety", "seepage", "slope"])  # fmt: skip
+def test_earlier_results_stay_where_the_site_has_a_mistake(tmp_path, study):
+    """A file with a typing error must not cost the results that --overwrite would replace."""
+    path, folder = site_in(tmp_path, SITE.replace("unit_weight", "unitweight")), tmp_path / "results"
+    folder.mkdir()
+    (folder / "summary.json").write_text("{}")
+    with pytest.raises(mpm.InputError):
+        importlib.import_module(study).main(["--site", str(path), "--output", str(folder), "--overwrite"])
+    assert [file.name for file in folder.iterdir()] == ["summary.json"]
+
+
 @pytest.mark.parametrize("study", ["slope", "embankment"])
 def test_numerical_damping_hardly_brakes_the_slide_of_a_site(tmp_path, study):
     """Both studies move a site as far as without any damping, to some percent, not by a part that depends on the study."""
