@@ -61,8 +61,8 @@ def add_pic(parser: argparse.ArgumentParser, default: float | None, about: str =
 
 def add_damping(parser: argparse.ArgumentParser) -> None:
     """Options ``--damping``, ``--mass-damping`` and ``--pic``, which `choose_damping` fills in."""
-    add_number(parser, "--damping", None, "-", "local damping (default: 0; 0.75 for the paper's run and quasi-static steps, 0.01 for a site)",
-               at_least=0, below=1)  # fmt: skip
+    add_number(parser, "--damping", None, "-", "local damping (default: 0; 0.75 for the paper's run and quasi-static steps, 0.01 "
+               "for a site)", at_least=0, below=1)  # fmt: skip
     add_number(parser, "--mass-damping", None, "1/s", "mass-proportional damping; results depend less on the mesh than with "
                "local damping (default: 5 for a height of 1 m, in inverse "
                "proportion to its square root; 0 with local damping or affine transfer, for the paper's run, a site and "

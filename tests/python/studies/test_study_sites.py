@@ -304,7 +304,10 @@ def test_a_site_slides_when_its_strength_is_reduced(tmp_path):
     assert 0.05 < moved[8.0, ""] < 9.81 / 2 * 0.4**2
 
 
-@pytest.mark.parametrize("study", ["collapse", "consolidation", "drawdown", "embankment", "excavation", "rain", "safety", "seepage", "slope"])  # fmt: skip
+@pytest.mark.parametrize(
+    "study",
+    ["collapse", "consolidation", "drawdown", "embankment", "excavation", "rain", "safety", "seepage", "slope"],
+)
 def test_earlier_results_stay_where_the_site_has_a_mistake(tmp_path, study):
     """A file with a typing error must not cost the results that --overwrite would replace."""
     path, folder = site_in(tmp_path, SITE.replace("unit_weight", "unitweight")), tmp_path / "results"
