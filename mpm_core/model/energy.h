@@ -22,7 +22,7 @@ struct EnergyBook
   double ahead = 0;           ///< part of it that belongs to the half step by which stresses are ahead of velocities
   double pic_loss = 0;        ///< kinetic energy that PIC, or affine transfer, has taken out
   double kinetic = 0;         ///< where particles have gradients, see `affine_kinetic_energy`; in a run at its start
-  double outflow_kinetic = 0; ///< of particles that flowed out
+  double outflow_kinetic = 0; ///< of particles that flowed out, and of water that left particles less that it brought
   double outflow_stored = 0;
   double balance_start = 0;  ///< see `energy_balance`, when the particles were last changed by anything but a step
   double kinetic_start = 0;  ///< likewise

@@ -178,13 +178,8 @@ bool may_be_unknown(const Model<G>& model, std::string_view name)
 /// Whether a number cannot be below 0.
 bool is_positive(std::string_view name)
 {
-  constexpr std::array names{"last_dt",
-                             "cell_travel",
-                             "seeded_mass",
-                             "outflow_mass",
-                             "energy_start_kinetic",
-                             "energy_outflow_kinetic",
-                             "energy_largest_work"};
+  constexpr std::array names{"last_dt",      "cell_travel",          "seeded_mass",
+                             "outflow_mass", "energy_start_kinetic", "energy_largest_work"};
   return std::ranges::find(names, name) != names.end() || name.starts_with("least_mass");
 }
 } // namespace

@@ -142,8 +142,8 @@ HOSTILE = {
         "/ranks/external_work in .* sum over ranks is 1.*, expected",
     ),
     "a negative energy": (
-        placed("ranks/energy_outflow_kinetic", 0, -5.0),
-        "/ranks/energy_outflow_kinetic in .* from 0 on",
+        placed("ranks/energy_start_kinetic", 0, -5.0),
+        "/ranks/energy_start_kinetic in .* from 0 on",
     ),
     "another time": (
         placed("ranks/time", 0, 3.0),
