@@ -10,7 +10,8 @@ template <class G, int D>
 void set_partition(Model<G>& model, const Mesh<D>& mesh, std::span<const GlobalIndex> owners)
 {
   reset_cells(model);
-  prepare(model); // so that ranks agree on which columns there are
+  prepare(model);                              // so that ranks agree on which columns there are
+  const double kinetic = model.energy.kinetic; // of nodes as supports hold them, which the new ones do not have yet
   std::vector<GlobalIndex> cells, ranks;
   for (Index cell : model.particles.cell)
   {
@@ -33,6 +34,7 @@ void set_partition(Model<G>& model, const Mesh<D>& mesh, std::span<const GlobalI
   model.migration = {};
   model.ready = false;
   prepare(model);
+  model.energy.kinetic = kinetic;
   map_to_nodes(model);
 }
 

@@ -18,3 +18,13 @@ def test_a_slide_is_the_same_on_any_number_of_ranks(comm, owners_of):
     for name, values in alone.items():
         np.testing.assert_allclose(spread[name], values, atol=1e-7 * np.abs(values).max(), err_msg=name)
     assert reports[0].pic_loss == pytest.approx(reports[1].pic_loss, rel=1e-5)
+
+
+def test_a_new_partition_changes_no_energy(comm):
+    # The kinetic energy of gradients is that of nodes as their supports hold them.
+    model, options = sliding_slope(comm), {"integration": mpm.Integration.MIXED, "transfer": mpm.Transfer.AFFINE}
+    before = model.explicit(until=0.2, **options).last()
+    model.rebalance()
+    after = model.report()
+    for name in ("kinetic_energy", "pic_loss", "unexplained_energy"):
+        assert getattr(after, name) == pytest.approx(getattr(before, name), abs=1e-9 * before.energy_scale)

@@ -131,8 +131,10 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
             with _usable(name):
                 _replace_contacts(model, *contacts)
                 take_water(model, there["water"])
+                model._core.set_supports(there["supports"])  # the energy of particles with gradients depends on them
             _core.restore(model._core, *_state(model, file, name, there), name)
         except RunError:
+            model._core.set_supports(model._conditions)
             _replace_contacts(model, *before)
             take_water(model, water)
             raise

@@ -105,6 +105,26 @@ def test_a_run_goes_on_from_a_file_to_the_last_bit(tmp_path):
         np.testing.assert_array_equal(by_id(second, name), by_id(first, name))
 
 
+def test_the_energy_of_a_block_on_supports_is_the_same_after_a_restart(tmp_path):
+    # The kinetic energy of gradients is that of nodes as their supports hold them.
+    def block():
+        model = thrown_block(2, lambda x: 0 * x)
+        model.fix(1)
+        model.roller(3, (0, 1))
+        return model
+
+    first, second = block(), block()
+    first.set_gravity((-3.0, -9.81))
+    run(first, 0.6, transfer=AFFINE)
+    first.save(tmp_path / "state.h5")
+    second.restore(tmp_path / "state.h5")
+    models = first, second
+    reports = [[model.report() for model in models], [run(model, 0.8, transfer=AFFINE) for model in models]]
+    for one, other in reports:
+        for name in ("kinetic_energy", "pic_loss", "unexplained_energy"):
+            assert getattr(other, name) == pytest.approx(getattr(one, name), abs=1e-9 * one.energy_scale)
+
+
 def test_flip_after_an_affine_run_has_no_gradients():
     # The momentum of the nodes is that of the particles' own velocities again, as in a model that never had gradients.
     models = [thrown_block(2, lambda x: 1.0 + np.sin(3 * x)) for _ in range(2)]
