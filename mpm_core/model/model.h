@@ -71,13 +71,21 @@ struct Inventory
   double mass = 0; ///< [kg]
 };
 
+/// The particles of a cell in all of its runs.
+struct CellContent
+{
+  Index particles;
+  double mass; ///< [kg]
+};
+
 /// The order of the particles by cells.
 struct CellOrder
 {
-  std::vector<Run> runs;            ///< of the particles as they are now, without the rows of resting cells
-  std::vector<unsigned char> marks; ///< scratch, one per cell; all zero
-  Index out_of_order = 0;           ///< particles that changed cell since the last sort
-  std::int64_t cost = 0;            ///< their sum over the steps since
+  std::vector<Run> runs;             ///< of the particles as they are now, without the rows of resting cells
+  std::vector<unsigned char> marks;  ///< scratch, one per cell; all zero
+  std::vector<CellContent> contents; ///< scratch, one per cell; of those with particles in an affine transfer
+  Index out_of_order = 0;            ///< particles that changed cell since the last sort
+  std::int64_t cost = 0;             ///< their sum over the steps since
 };
 
 /// What changes cells or ranks in a step.

@@ -49,28 +49,46 @@ void update_stress(Model<G>& model, const PassOptions& options, const Batch& bat
     note_lost_volume(model, batch, scratch);
 }
 
-/// A vertex with less than this part of a particle's mass counts as light.
+/// Counts the particles of each cell. Those of other laws are in runs of their own, and so are those that have come
+/// since the last sort: which runs there are depends on the ranks, and the motion must not.
+template <class G>
+void find_contents(Model<G>& model)
+{
+  CellOrder& order = model.order;
+  order.contents.resize(static_cast<std::size_t>(model.mesh.owned_cells));
+  for (const Run& run : order.runs)
+    order.contents[static_cast<std::size_t>(run.cell)] = {};
+  for (const Run& run : order.runs)
+  {
+    CellContent& content = order.contents[static_cast<std::size_t>(run.cell)];
+    content.particles += run.last - run.first;
+    for (Index p = run.first; p < run.last; ++p)
+      content.mass += model.particles.mass[p];
+  }
+}
+
+/// A vertex with less than this part of the mean mass of a cell's particles counts as light.
 constexpr double part_of_light_vertex = 0.2;
 
 /// Whether few particles are in a cell, one of whose vertices is light. The second mapping (19) gives such a vertex the
 /// mean of the particles' changes of velocity, and nothing of their gradient: stresses hardly resist a gradient that is
 /// carried on, and a particle at the surface, which goes to and fro between two cells, is shaken ever more by it.
 template <class G, int D = G::dim>
-bool is_sparse(const Mesh<D>& mesh, const VelocityField<G>& field, const Particles<D>& particles, const Run& run)
+bool is_sparse(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell, const CellContent& content)
 {
-  const double least = part_of_light_vertex * particles.mass[run.first];
+  const double least = part_of_light_vertex * content.mass / content.particles;
   const auto is_light = [&](Index node) { return field.nodes[node].mass < least; };
-  return run.last - run.first <= D && std::ranges::any_of(mesh.cells[run.cell], is_light);
+  return content.particles <= D && std::ranges::any_of(mesh.cells[cell], is_light);
 }
 
 /// The gradient of their velocity that particles carry with affine transfer: PIC leaves a part of it out, and in sparse
 /// cells only the spin is left, without which a body that turns would lose its angular momentum.
 template <class G, int D = G::dim>
-Matrix<D> carried_gradient(const Mesh<D>& mesh, const VelocityField<G>& field, const Particles<D>& particles,
-                           const PassOptions& options, const Run& run, const CellMotion<D>& motion)
+Matrix<D> carried_gradient(const Mesh<D>& mesh, const VelocityField<G>& field, const PassOptions& options, Index cell,
+                           const CellContent& content, const CellMotion<D>& motion)
 {
   Matrix<D> gradient = scaled<D>(motion.change, 1 - options.pic_fraction).gradient;
-  if (is_sparse(mesh, field, particles, run))
+  if (is_sparse(mesh, field, cell, content))
     for (int a = 0; a < D; ++a)
       for (int b = 0; b <= a; ++b)
       {
@@ -155,7 +173,9 @@ void move_batch(Model<G>& model, const VelocityField<G>& field, const PassOption
     if (affine)
     {
       Matrix<D>& carried = scratch.carried[r - batch.first_run];
-      carried = carried_gradient(model.mesh, field, particles, options, runs[r], motion);
+      const Index cell = runs[r].cell;
+      const CellContent& content = model.order.contents[static_cast<std::size_t>(cell)];
+      carried = carried_gradient(model.mesh, field, options, cell, content, motion);
       keep_gradient<D>(particles, runs[r], carried);
     }
     const bool inside =
@@ -240,6 +260,8 @@ void particle_pass(Model<G>& model, const PassOptions& options)
     model.last.plastic = 0;
     model.energy.ahead = 0;
   }
+  if (options.transfer == Transfer::affine)
+    find_contents(model);
   if (model.fields.front().integration.kind == Integration::dual_domain)
     pass_batches<StrainPerParticle>(model, options);
   else

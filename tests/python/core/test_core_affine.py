@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from core_cases import DIMS, box, by_id, run
+from core_cases import DIMS, box, by_id, rollers, run
 
 import mpm_core as mpm
 
@@ -103,6 +103,28 @@ def test_a_run_goes_on_from_a_file_to_the_last_bit(tmp_path):
         assert getattr(reports[1], name) == pytest.approx(getattr(reports[0], name), abs=1e-9 * reports[0].energy_scale)
     for name in ("position", "velocity", "stress", "velocity_gradient"):
         np.testing.assert_array_equal(by_id(second, name), by_id(first, name))
+
+
+@pytest.mark.parametrize("dim", DIMS)
+def test_soil_moves_the_same_where_each_cell_has_particles_of_two_equal_laws(dim):
+    # The particles of a cell are in several parts of memory where they have several laws, as they are where some have come from
+    # another cell: all of them together say whether the cell is sparse.
+    soil = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=200.0, friction_angle=25.0)
+    whole = box([10] + [4] * (dim - 1), [2.5] + [1.0] * (dim - 1), shake=0.2, body=([0.0] * dim, [1.0] * dim))
+    first, second = (mpm.Model(whole, [soil, soil]) for _ in range(2))
+    for model in (first, second):
+        model.seed(density=2000.0, per_cell=4, cell_tag=1)
+        if model is second:
+            model.assign(model.particles.id % 2)
+        rollers(model, but=(2, 2 * dim))
+        model.set_gravity([0.0] * (dim - 1) + [-9.81])
+        run(model, 0.35, transfer=AFFINE, integration=mpm.Integration.MIXED)
+    assert np.abs(first.particles.displacement).max() > 0.3  # a cell has 0.25
+    for name in ("position", "velocity", "velocity_gradient"):
+        expected = by_id(first, name)
+        np.testing.assert_allclose(
+            by_id(second, name), expected, rtol=0, atol=1e-7 * np.abs(expected).max(), err_msg=name
+        )
 
 
 def test_the_energy_of_a_block_on_supports_is_the_same_after_a_restart(tmp_path):
