@@ -46,8 +46,8 @@ TrialReport trial_report(const NodeExchange& exchange, const VelocityField<G>& f
     sums[3] += dot<D>(f.inertia, f.inertia);
     const double per_velocity = least_part * (field.nodes[i].mass / step.dt + step.elastic[i] * step.dt);
     sums[8] += per_velocity * per_velocity * dot<D>(field.velocity[i], field.velocity[i]);
-    if (step.pore.flows)
-      sums[step.pore.held[i] ? 7 : 6] += step.pore.unit * step.pore.unit * step.pore.content[i] * step.pore.content[i];
+    if (const double water = step.pore.flows ? step.pore.unit / step.pore.length * step.pore.content[i] : 0; water != 0)
+      sums[step.pore.held[i] ? 7 : 6] += water * water;
     if (step.pore.flows && !step.pore.held[i])
       sums[9] += std::abs(step.pore.content[i]);
   }
@@ -57,7 +57,8 @@ TrialReport trial_report(const NodeExchange& exchange, const VelocityField<G>& f
   sums[5] = static_cast<double>(count.failed);
   MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, exchange.comm);
   const double scale = std::max({sums[1], sums[2], sums[3], sums[8]});
-  // Volumes of water times the unit of pressure count as forces: a volumetric strain weighs as much as its stress.
+  // Volumes of water times the unit of pressure over the size of cells count as forces: a volumetric strain weighs as
+  // much as its stress, whatever the size of the problem.
   const double water_scale = std::max(scale, sums[7]);
   const double residual = water_scale > 0 ? std::max(sums[0], sums[6] * (scale > 0 ? scale / water_scale : 1)) : 0;
   return {std::sqrt(residual), std::sqrt(scale > 0 ? scale : water_scale), sums[10] > 0 ? sums[9] / sums[10] : 0,

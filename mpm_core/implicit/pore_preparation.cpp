@@ -280,6 +280,18 @@ bool pressure_is_free(NodeExchange& exchange, const VelocityField<G>& field, con
   MPI_Allreduce(MPI_IN_PLACE, largest.data(), 3, MPI_DOUBLE, MPI_MAX, exchange.comm);
   return largest[0] == 0 && largest[2] <= 1e-10 * largest[1];
 }
+
+/// Mean size of the cells with soil [m].
+/// @note Collective
+template <int D>
+double mean_size(const Mesh<D>& mesh, std::span<const Index> cells, MPI_Comm comm)
+{
+  std::array<double, 2> sums{0, static_cast<double>(cells.size())};
+  for (Index c : cells)
+    sums[0] += cell_size<D>(mesh.shapes[static_cast<std::size_t>(c)].volume);
+  MPI_Allreduce(MPI_IN_PLACE, sums.data(), 2, MPI_DOUBLE, MPI_SUM, comm);
+  return sums[0] / sums[1];
+}
 } // namespace
 
 template <class G>
@@ -321,6 +333,7 @@ void start_pore_water(Model<G>& model, ImplicitStep<G>& step)
   pore.unit = 0;
   for (const Law& law : model.laws)
     pore.unit = std::max(pore.unit, p_wave_modulus(law));
+  pore.length = mean_size<G::dim>(model.mesh, step.cells, model.exchange.comm);
   hold_pressures(model, model.exchange, step);
   impose_pressures(step.dt, pore);
   if (std::isinf(model.water->modulus) && !model.water->may_dry() &&

@@ -64,6 +64,7 @@ struct PoreStep
   bool drained = false; ///< whether water leaves at the free surface
   bool flows = false;   ///< whether pressures are unknowns of the step; otherwise they stay as they are
   double unit = 1;      ///< of the pressures in the linear system [Pa]
+  double length = 1;    ///< mean size of the cells with soil [m]; unit over it makes forces of volumes of water
   double density = 0;   ///< of water [kg/m3]
   Vector<D> gravity{};
   std::vector<PoreCell<D>> cells;    ///< of each owned cell

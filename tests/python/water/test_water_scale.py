@@ -32,6 +32,26 @@ def slide(model, until, time=1.0):
     return list(model.implicit(until * time, dt=DT * time, integration=mpm.Integration.MIXED))
 
 
+@pytest.mark.parametrize("units", [(2.0**10, 2.0**5, 2.0**30), (2.0**-10, 2.0**-5, 2.0**-30)])
+@pytest.mark.filterwarnings("ignore")
+def test_a_problem_of_another_size_takes_the_same_iterations(units):
+    # The same density and gravity, as in a model test: lengths as l, times as the root of l, stresses as l.
+    length, time, mass = units
+    one, other = heap(), heap(*units)
+    ours, theirs = slide(one, END), slide(other, END, time)
+    assert [report.iterations for report in theirs] == [report.iterations for report in ours]
+    assert np.abs(one.particles.displacement).max() > 0.05
+    np.testing.assert_allclose([r.residual for r in theirs], [r.residual for r in ours], atol=1e-10)
+    for name, unit in (
+        ("position", length), ("velocity", length / time), ("stress", mass / length / time**2),
+        ("pore_pressure", mass / length / time**2),
+    ):  # fmt: skip
+        expected = by_id(one, name)
+        np.testing.assert_allclose(
+            by_id(other, name) / unit, expected, atol=1e-9 * np.abs(expected).max(), err_msg=name
+        )
+
+
 @pytest.mark.filterwarnings("ignore")
 def test_a_slide_that_has_taken_in_water_goes_on_from_a_file_to_the_last_bit(tmp_path):
     # Soil that shears draws water in, which brings its kinetic energy along: the energy that has left is below zero.
