@@ -135,14 +135,30 @@ GhostFacet<D> outer_facet(const Mesh<D>& mesh, Index cell, int k)
   return facet;
 }
 
-/// Weights of a facet of cell c, opposite to vertex k; h is the mean of both altitudes over it.
+/// Centre of the facet of a cell opposite to vertex k.
+template <int D>
+Vector<D> facet_centre(const Mesh<D>& mesh, Index cell, int k)
+{
+  Vector<D> centre{};
+  for (Index node : facet_nodes<D>(mesh.cells[cell], k))
+    for (int a = 0; a < D; ++a)
+      centre[a] += mesh.points[node][a] / D;
+  return centre;
+}
+
+/// Area of the facet of a cell opposite to vertex k, in axial symmetry that of one radian at the radius of a point.
 template <class G, int D = G::dim>
-void set_weights(const Mesh<D>& mesh, Index c, int k, double volumes, const CellContents& both,
-                 const GhostOptions& options, GhostFacet<D>& facet)
+double area_at(const Mesh<D>& mesh, Index cell, int k, const Vector<G::dim>& point)
 {
   // |grad N_k| is one over the altitude, so the facet's measure is D times the volume times that.
-  // In axial symmetry both are those of one radian, at the cell's radius.
-  const double area = D * cell_volume<G>(mesh.shapes[c]) * norm<D>(mesh.shapes[c].gradient[k]);
+  return D * mesh.shapes[cell].volume * norm<D>(mesh.shapes[cell].gradient[k]) * thickness<G>(point);
+}
+
+/// Weights of a facet; h is the mean of both altitudes over it.
+template <int D>
+void set_weights(double area, double volumes, const CellContents& both, const GhostOptions& options,
+                 GhostFacet<D>& facet)
+{
   const double h = D * volumes / (2 * area);
   facet.area = area;
   facet.size = h;
@@ -179,7 +195,8 @@ std::vector<GhostFacet<D>> find_ghost_facets(Model<G>& model, const MaterialPoin
       if (lone)
       {
         GhostFacet<D> facet = outer_facet(mesh, c, k);
-        set_weights<G>(mesh, c, k, cell_volume<G>(mesh.shapes[c]), contents[c], options, facet);
+        const double area = area_at<G>(mesh, c, k, mesh.shapes[c].centre); // a facet on the axis has none of its own
+        set_weights<D>(area, cell_volume<G>(mesh.shapes[c]), contents[c], options, facet);
         facets.push_back(facet);
       }
       // Each facet once: from the lower of two owned cells, and from the owned cell where the other is a ghost.
@@ -188,8 +205,9 @@ std::vector<GhostFacet<D>> find_ghost_facets(Model<G>& model, const MaterialPoin
         GhostFacet<D> facet = facet_between(mesh, c, k, other);
         const CellContents both{contents[c].volume + contents[other].volume, contents[c].mass + contents[other].mass,
                                 contents[c].shear + contents[other].shear};
-        set_weights<G>(mesh, c, k, cell_volume<G>(mesh.shapes[c]) + cell_volume<G>(mesh.shapes[other]), both, options,
-                       facet);
+        // The same from both sides: in axial symmetry they have different radii.
+        const double area = area_at<G>(mesh, c, k, facet_centre<D>(mesh, c, k));
+        set_weights<D>(area, cell_volume<G>(mesh.shapes[c]) + cell_volume<G>(mesh.shapes[other]), both, options, facet);
         facets.push_back(facet);
       }
     }

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from implicit_cases import LEFT, floor, linear_elastic_solution
 from mpi4py import MPI
-from partitions import all_by_id, bands, one_does_all, scattered, sliding_slope, spread_box
+from partitions import all_by_id, assert_same, bands, one_does_all, scattered, sliding_slope, spread_box
 
 import mpm_core as mpm
 
@@ -66,3 +66,21 @@ def test_steps_are_the_same_on_any_partition(comm, owners_of, solver, nmd):
     for name in ("position", "stress", "state"):
         size = np.abs(expected[name]).max()
         np.testing.assert_allclose(moved[name], expected[name], rtol=0, atol=1e-7 * size, err_msg=name)
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered])
+def test_a_cylinder_that_spreads_does_so_alike_on_any_partition(comm, owners_of):
+    # Half-full cells have ghost penalties on both of their sides, whose radii differ in axial symmetry.
+    def spread(comm, owners_of=bands):
+        mesh = spread_box((16, 6), (1.6, 0.6), comm, owners_of, diagonals="alternating", body=((0.0, 0.0), (0.5, 0.4)))
+        soil = mpm.DruckerPrager(young=4e6, poisson=0.3, strength=300.0, friction=0.3)
+        model = mpm.Model(mesh, soil, geometry=mpm.Geometry.AXISYMMETRIC)
+        model.seed(density=2000.0, per_cell=6, cell_tag=1)
+        model.fix(3)
+        model.set_gravity((0.0, -9.81))
+        model.implicit(0.3, dt=0.01, integration=mpm.Integration.MIXED).last()
+        return model
+
+    moved, expected = all_by_id(spread(comm, owners_of)), all_by_id(spread(MPI.COMM_SELF))
+    assert np.abs(expected["displacement"]).max() > 0.05
+    assert_same(moved, expected, 1e-7)
