@@ -185,8 +185,9 @@ void bind_model(py::module_& m, const std::string& suffix)
            {
              std::map<Vector<D>, std::vector<DashpotEntry<D>>> entries;
              for (const auto& d : model.fields.front().dashpots)
-               entries[model.mesh.points[d.node]].push_back(
-                   {d.damping, d.stiffness, d.held, d.displacement, d.free_field, d.area, d.is_rigid});
+               if (model.exchange.owned[d.node]) // springs of nodes that only ghost cells have do not move
+                 entries[model.mesh.points[d.node]].push_back(
+                     {d.damping, d.stiffness, d.held, d.displacement, d.free_field, d.area, d.is_rigid});
              return std::vector(entries.begin(), entries.end());
            })
       .def("set_dashpots",
