@@ -59,7 +59,7 @@ def parser() -> ArgumentParser:
     add_number(p, "--height", 3.0, "m", "height of the slope", above=0)
     add_number(p, "--angle", 12.0, "degrees", "inclination of the slope", above=0, below=60)
     add_number(p, "--crest", 4.0, "m", "length of the level ground behind the slope", above=0)
-    add_number(p, "--runout-length", 8.0, "m", "length of the background mesh beyond the toe", above=0)
+    add_number(p, "--runout-length", 40.0, "m", "length of the background mesh beyond the toe", above=0)
     formerly(p, "runout", "--runout-length")
     add_number(p, "--cell-size", 0.25, "m", "edge of the triangles", above=0)
     add_number(p, "--pressure-ratio", 0.9, "-", "ratio of the rise of the pore pressures to the effective vertical stresses",
@@ -77,9 +77,9 @@ def parser() -> ArgumentParser:
                "pressure; above 0 for loose sand")  # fmt: skip
     for name, value in NOR_SAND.items():
         add_parameter(p, mpm.NorSand, name, value, "NorSand: ")
-    add_number(p, "--time", 6.0, "s", "duration", above=0)
+    add_number(p, "--time", 10.0, "s", "duration", above=0)
     add_number(p, "--air-entry", 2e4, "Pa", "suction up to which pores stay full; 0 lets them run empty", at_least=0)
-    body_runs.add_body_run_options(p, damping=0.0, pic=0.01, nmd=True, frames=60)
+    body_runs.add_body_run_options(p, damping=0.0, pic=0.0005, nmd=True, frames=60)
     return p
 
 

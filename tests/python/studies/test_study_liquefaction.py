@@ -77,16 +77,16 @@ def test_gravel_that_drains_and_carries_its_weight_rests(tmp_path):
 @pytest.mark.parametrize(
     "options",
     [
-        ["--cell-size", "0.3"],
+        ["--cell-size", "0.3", "--time", "6"],
         ["--cell-size", "0.4", "--material", "nor-sand", "--pressure-ratio", "0.5", "--time", "4"],
     ],
     ids=["Mohr-Coulomb", "NorSand"],
 )
-def test_sand_that_hardly_drains_runs_out_as_far_as_the_law_of_undrained_soil_lets_it(options):
-    """In 6 s hardly any water leaves fine sand: soil and water with velocities of their own, and a law of undrained soil that has
-    the same skeleton and the same water, start from the same stresses and run out alike. After 4 s the front of NorSand is thinner
-    than a cell, where water leaves it, and loose sand that has lost water is strong."""
-    a = study.parse(options)
+def test_soil_that_hardly_drains_runs_out_as_far_as_the_law_of_undrained_soil_lets_it(options):
+    """Hardly any water flows through silt in a few seconds: soil and water with velocities of their own, and a law of undrained soil
+    that has the same skeleton and the same water, start from the same stresses and run out alike. After 4 s the front of NorSand is
+    thinner than a cell, where water leaves it, and loose sand that has lost water is strong."""
+    a = study.parse([*options, "--conductivity", "1e-7"])
     model = study.build(a)
     skeleton = model.laws[0]
     undrained = mpm.Model(model.mesh, mpm.Undrained(skeleton, water_modulus=a.water_modulus, porosity=a.porosity))
@@ -106,20 +106,21 @@ def test_sand_that_hardly_drains_runs_out_as_far_as_the_law_of_undrained_soil_le
         start = study.front(m.particles.position[:, 0], m.particles.volume)
         m.explicit(a.time, pic=a.pic, nmd=True, integration=mpm.Integration.MIXED).last()
         runouts.append(study.front(m.particles.position[:, 0], m.particles.volume) - start)
-    assert runouts[0] == pytest.approx(runouts[1], rel=0.15) and runouts[1] > 2
+    assert runouts[0] == pytest.approx(runouts[1], rel=0.1) and runouts[1] > 5
 
 
 def test_loose_sand_flows_where_dense_sand_rests(tmp_path):
     """Pore pressures that take half of the effective stresses leave twice the shear stress over them, tan 12 / (1 - 0.5) = 0.43, below
     the friction of a layer at the critical state in plane strain, M / (sqrt(3) g) = 0.57: only sand that contracts loses the rest of
-    its strength. Under the pore pressures of the start loose sand rests as well, since it starts in equilibrium.
+    its strength. Under the pore pressures of the start loose sand rests as well, since it starts in equilibrium; on cells of half a
+    metre noise would set it off.
     """
     nor_sand = ["--material", "nor-sand", "--pressure-ratio", "0.5", "--time", "4"]
     loose = slid(tmp_path / "loose", *nor_sand)
     assert loose["runout_m"] > 1.0 and loose["crest_settlement_m"] > 0.4
     dense = slid(tmp_path / "dense", *nor_sand, "--state-parameter", "-0.05")
     assert abs(dense["runout_m"]) < 0.01 and abs(dense["crest_settlement_m"]) < 0.01
-    at_rest = slid(tmp_path / "at_rest", *nor_sand, "--pressure-ratio", "0")
+    at_rest = slid(tmp_path / "at_rest", *nor_sand, "--pressure-ratio", "0", "--cell-size", "0.4")
     assert abs(at_rest["runout_m"]) < 1e-3 and abs(at_rest["crest_settlement_m"]) < 1e-3
 
 
