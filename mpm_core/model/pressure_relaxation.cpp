@@ -98,6 +98,7 @@ bool find_weights(const std::array<Vector<D>, D + 1>& corners, const Vector<D>& 
   }
   return std::ranges::all_of(weights, [](double weight) { return std::abs(weight) < farthest; });
 }
+
 /// Rate of shear strain of a cell, sqrt(2 e : e) of the deviator of its rate of deformation.
 template <class G, int D = G::dim>
 double shear_rate(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
