@@ -34,6 +34,13 @@ void check_phases(const Particles<D>& particles, const PoreWater& water)
 } // namespace
 
 template <class G>
+void fill_pores(Model<G>& model)
+{
+  for (Index p = 0; p < model.particles.size(); ++p)
+    model.particles.water_mass[0][p] = water_mass(model.particles, *model.water, p);
+}
+
+template <class G>
 void split_phases(Model<G>& model)
 {
   Particles<G::dim>& particles = model.particles;
@@ -319,6 +326,7 @@ std::vector<double> averaged_pressures(Model<G>& model)
 }
 
 #define INSTANTIATE(G)                                                                                                 \
+  template void fill_pores(Model<G>&);                                                                                 \
   template void split_phases(Model<G>&);                                                                               \
   template void water_to_nodes(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&, const std::vector<Run>&,  \
                                const PoreWater&, const VelocityField<G>&, WaterField<G>&);                             \

@@ -22,6 +22,11 @@ namespace mpm::model
 template <class G>
 void split_phases(Model<G>& model);
 
+/// Gives particles the mass of water of full pores at their pressures, as after pressures or porosities were set.
+/// @pre has_two_phases(model)
+template <class G>
+void fill_pores(Model<G>& model);
+
 /// Sums of the water over the particles, at the nodes: masses, momenta, forces of the pore pressures, volumes of the
 /// soil and coefficients of the drag; of this rank. Pressures are averaged as the soil's stresses are.
 /// @note Collective where stresses are integrated over whole cells, or averaged

@@ -3,6 +3,7 @@
 /// Fields of particles by name, as NumPy arrays.
 
 #include "model/model.h"
+#include "model/water_mapping.h"
 #include "python/field_views.h"
 
 #include <pybind11/stl.h>
@@ -226,6 +227,8 @@ void set_column(Model<G>& model, const std::string& name, const py::array& array
   with_field(particles, name, set_field);
   if (!is_set)
     throw InputError("particle field is '" + name + "', which cannot be set");
+  if (has_two_phases(model) && (name == "pore_pressure" || name == "porosity"))
+    fill_pores(model); // from whose mass the pressure follows in steps
   changed(model);
 }
 

@@ -264,6 +264,18 @@ def test_phases_exchange_momentum_without_making_any():
     np.testing.assert_allclose(now + left, start, atol=1e-12 * np.abs(start).max())
 
 
+def test_pore_pressures_can_be_set_between_runs():
+    """The mass of the water follows, so that steps go on from them; so it does with the porosity."""
+    model = column(4, conductivity=1e-6, modulus=2.2e7)
+    list(model.explicit(1e-9))
+    p = model.particles
+    p.set("pore_pressure", p.pore_pressure + 5e3)
+    model.explicit(2e-9).last()
+    np.testing.assert_allclose(model.particles.pore_pressure, 5e3, rtol=1e-4)
+    p.set("porosity", 0.9 * p.porosity)
+    np.testing.assert_allclose(p.water_mass, WATER * (1 + p.pore_pressure / 2.2e7) * p.porosity * p.volume, rtol=1e-14)
+
+
 def test_saturated_soil_in_free_fall_stays_as_it_is():
     mesh = box((6, 6), (3.0, 3.0), body=((1.0, 1.0), (2.0, 2.0)))
     model = mpm.Model(mesh, ELASTIC)
