@@ -172,8 +172,7 @@ class PoreWater(Conditions):
     def set_pore_pressure(self, pressure: float | Callable[[NDArray], ArrayLike]) -> None:
         """Give the particles pore pressures: those at the nodes, and linear in each cell.
 
-        Where soil may dry its saturation and mass follow. Where water moves by itself, after explicit steps, its mass follows: that
-        of full pores.
+        Where soil may dry its saturation and mass follow; where water moves by itself, its mass does, that of full pores.
 
         Args:
             pressure: [Pa], compression positive: a number, or a function of positions, shape (n, D), that returns shape (n,).
