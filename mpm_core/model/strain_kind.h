@@ -34,7 +34,7 @@ inline double half_work(const double (&stress)[n_stress<D>][batch_size], const B
     for (std::size_t k = 0; k < G::n_working; ++k)
       sum += mine ? load(stress[k] + r) * scratch.cells[r / lanes].increment[working_component<G>[k]] : Lanes{};
   }
-  return 0.5 * transfer::sum(sum);
+  return 0.5 * base::sum(sum);
 }
 
 /// Integration over particles, or mixed: volumes and work follow from the moments of a cell and its one strain.

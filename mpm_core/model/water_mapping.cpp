@@ -56,12 +56,9 @@ void split_phases(Model<G>& model)
     for (auto& gradient : particles.pressure_gradient.columns)
       std::ranges::fill(gradient, 0.0); // water spreads evenly over the pores of a cell
   }
+  fill_pores(model);
   for (Index p = 0; p < particles.size(); ++p)
-  {
-    const double mass = water_mass(particles, *model.water, p);
-    particles.water_mass[0][p] = mass;
-    particles.mass[p] -= mass;
-  }
+    particles.mass[p] -= particles.water_mass[0][p];
   model.ready = false;
   model.energy.stale = true;
 }

@@ -67,7 +67,7 @@ double pressure_sum(const Particles<D>& particles, const Run& run)
   add_lanes(std::array<const double*, 2>{particles.volume.data(), particles.pore_pressure[0].data()}, run.first,
             run.last,
             [&sum](const Piece<2>& piece, const LaneMask& mine) { sum += mine ? piece[0] * piece[1] : Lanes{}; });
-  return transfer::sum(sum);
+  return base::sum(sum);
 }
 
 /// @returns whether all pores are open
