@@ -20,6 +20,7 @@
 #include "mesh/mesh.h"
 #include "particles/particles.h"
 
+#include <functional>
 #include <limits>
 
 namespace mpm::contact
@@ -107,11 +108,22 @@ struct Movers
   Index field;
 };
 
+/// What a surface does to pore water that moves by itself, of which it carries the pressure, too.
+template <int D>
+struct WaterBeside
+{
+  /// Fraction of the normal stress on the surface that the water of a cell carries, at most 1; it causes no friction
+  std::function<double(Index cell, const Vector<D>& normal)> fraction;
+  std::span<Vector<D>> forces;  ///< what of the forces acts on the water, at the nodes; added to [N]
+  std::span<Vector<D>> normals; ///< the normal forces on soil and water; likewise
+};
+
 /// Adds the forces on particles to their nodes, and to what the surface feels.
 /// @param velocity  of the nodes at the step's start [m/s]
+/// @param water     null where the soil has no water with a velocity of its own
 /// @returns whether any particle was in contact
 template <class G, int D = G::dim>
 bool add_contact_forces(const Mesh<D>& mesh, const std::vector<Run>& runs, const Movers& movers,
                         std::span<const Vector<D>> velocity, double dt, Particles<D>& particles, Contact<D>& contact,
-                        std::span<Vector<D>> forces);
+                        std::span<Vector<D>> forces, const WaterBeside<D>* water = nullptr);
 } // namespace mpm::contact

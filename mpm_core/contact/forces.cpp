@@ -93,10 +93,19 @@ void leave_slip(const Press<D>& press, Index p)
     (*press.slips)[i][p] = 0;
 }
 
+/// Force on a particle.
+template <int D>
+struct ParticleForce
+{
+  Vector<D> force;
+  Vector<D> normal;      ///< the part of it along the normal of the surface
+  double water_fraction; ///< of that part
+};
+
 /// Force on a particle that is tied to the surface, by all of its motion relative to the body.
 template <class G, int D = G::dim>
-std::optional<Vector<D>> bond_force(const Press<D>& press, const Distance<D>& nearest, const Vector<D>& velocity,
-                                    const Particles<D>& particles, Index p, Contact<D>& contact)
+std::optional<ParticleForce<D>> bond_force(const Press<D>& press, const Distance<D>& nearest, const Vector<D>& velocity,
+                                           const Particles<D>& particles, Index p, Contact<D>& contact)
 {
   const Vector<D> x = at<D>(particles.position, p);
   const Touch<D> touch = touch_of<D>(contact, press, nearest, x, velocity);
@@ -117,13 +126,17 @@ std::optional<Vector<D>> bond_force(const Press<D>& press, const Distance<D>& ne
   reaction.sticking += area;
   reaction.normal += dot<D>(force, touch.normal);
   react<D>(force, arm, reaction);
-  return force;
+  ParticleForce<D> found{force, touch.normal, 0};
+  for (double& component : found.normal)
+    component *= dot<D>(force, touch.normal);
+  return found;
 }
 
 /// Force on a particle, whose velocity is that of the nodes at its place; takes its slip along. None without contact.
 template <class G, int D = G::dim>
-std::optional<Vector<D>> particle_force(const Press<D>& press, const Distance<D>& nearest, const Vector<D>& velocity,
-                                        const Particles<D>& particles, Index p, Contact<D>& contact)
+std::optional<ParticleForce<D>> particle_force(const Press<D>& press, const Distance<D>& nearest,
+                                               const Vector<D>& velocity, const Particles<D>& particles, Index p,
+                                               const WaterBeside<D>* water, Contact<D>& contact)
 {
   const Touch<D> touch = touch_of<D>(contact, press, nearest, at<D>(particles.position, p), velocity);
   if (!is_near<G>(particles, p, touch.after))
@@ -151,18 +164,22 @@ std::optional<Vector<D>> particle_force(const Press<D>& press, const Distance<D>
   reaction.area += area;
   reaction.mass += mass;
   reaction.normal += stiffness * depth;
+  const WaterShare share{water ? water->fraction(particles.cell[p], touch.normal) : 0};
   if (press.slips)
   {
-    const double longest = contact.friction * depth + contact.adhesion * area / stiffness;
+    const double longest = contact.friction * carried_by_grains(share) * depth + contact.adhesion * area / stiffness;
     reaction.sticking += update_slip<D>(touch.normal, touch.motion, longest, slip) ? area : 0;
     for (std::size_t i = 0; i < D; ++i)
       (*press.slips)[i][p] = slip[i];
   }
-  Vector<D> force;
+  ParticleForce<D> found{{}, {}, share.fraction};
   for (int i = 0; i < D; ++i)
-    force[i] = stiffness * (depth * touch.normal[i] - slip[i]);
-  react<D>(force, touch.arm, reaction);
-  return force;
+  {
+    found.normal[i] = stiffness * depth * touch.normal[i];
+    found.force[i] = stiffness * (depth * touch.normal[i] - slip[i]);
+  }
+  react<D>(found.force, touch.arm, reaction);
+  return found;
 }
 
 /// Lower bound of the distance of a point of a cell from the surface, where it was when the bounds were found.
@@ -230,11 +247,42 @@ std::optional<Distance<D>> near_distance(const Contact<D>& contact, const Press<
   return distance<D>(contact.surface, as_it_was);
 }
 
+/// Moments of the forces on the particles of a run.
+template <int D>
+struct RunForces
+{
+  TractionMoments<D> all{};
+  TractionMoments<D> on_water{}; ///< the part that water which moves by itself carries
+  TractionMoments<D> normal{};   ///< of all of them, with such water
+};
+
+/// Adds a fraction of a force.
+template <int D>
+void add_force(double fraction, const Vector<D>& force, const Vector<D>& xi, TractionMoments<D>& moments)
+{
+  for (int i = 0; i < D; ++i)
+  {
+    moments.force[i] += fraction * force[i];
+    for (int j = 0; j < D; ++j)
+      moments.force_xi[i][j] += fraction * force[i] * xi[j];
+  }
+}
+
+template <int D>
+void add_to_nodes(const Mesh<D>& mesh, Index cell, const TractionMoments<D>& moments, std::span<Vector<D>> forces)
+{
+  for (int k = 0; k <= D; ++k)
+    for (int i = 0; i < D; ++i)
+      forces[static_cast<std::size_t>(mesh.cells[cell][k])][i] +=
+          at_vertex<D>(moments.force[i], moments.force_xi[i], mesh.shapes[cell].gradient[k]);
+}
+
 /// Forces on the particles of a run, by their moments.
 /// @returns whether any was in contact
 template <class G, int D = G::dim>
 bool press_run(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> velocity, const Press<D>& press,
-               const Sight<D>& sight, Particles<D>& particles, Contact<D>& contact, TractionMoments<D>& moments)
+               const Sight<D>& sight, const WaterBeside<D>* water, Particles<D>& particles, Contact<D>& contact,
+               RunForces<D>& forces)
 {
   const auto nodal = [velocity](Index i) -> const Vector<D>& { return velocity[static_cast<std::size_t>(i)]; };
   std::optional<AffineField<D>> field; // found where any particle is near
@@ -258,17 +306,16 @@ bool press_run(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> v
     Vector<D> v;
     for (int i = 0; i < D; ++i)
       v[i] = field->value[i] + dot<D>(field->gradient[i], xi);
-    const auto force = press.bonds ? bond_force<G, D>(press, *nearest, v, particles, p, contact)
-                                   : particle_force<G, D>(press, *nearest, v, particles, p, contact);
-    if (!force)
+    const auto found = press.bonds ? bond_force<G, D>(press, *nearest, v, particles, p, contact)
+                                   : particle_force<G, D>(press, *nearest, v, particles, p, water, contact);
+    if (!found)
       continue;
     touched = true;
-    for (int i = 0; i < D; ++i)
-    {
-      moments.force[i] += (*force)[i];
-      for (int j = 0; j < D; ++j)
-        moments.force_xi[i][j] += (*force)[i] * xi[j];
-    }
+    add_force<D>(1, found->force, xi, forces.all);
+    if (!water)
+      continue;
+    add_force<D>(found->water_fraction, found->normal, xi, forces.on_water);
+    add_force<D>(1, found->normal, xi, forces.normal);
   }
   return touched;
 }
@@ -277,7 +324,7 @@ bool press_run(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> v
 template <class G, int D>
 bool add_contact_forces(const Mesh<D>& mesh, const std::vector<Run>& runs, const Movers& movers,
                         std::span<const Vector<D>> velocity, double dt, Particles<D>& particles, Contact<D>& contact,
-                        std::span<Vector<D>> forces)
+                        std::span<Vector<D>> forces, const WaterBeside<D>* water)
 {
   const Press<D> press = press_of(contact, dt, particles);
   const double travelled = contact.travel + step_travel(contact, contact.body, dt);
@@ -295,23 +342,25 @@ bool add_contact_forces(const Mesh<D>& mesh, const std::vector<Run>& runs, const
         leave_slip<D>(press, p);
       continue;
     }
-    TractionMoments<D> moments{};
-    const Sight<D> sight = sight_of<D>(contact, static_cast<Index>(run.cell), travelled, extremes);
-    if (!press_run<G, D>(mesh, run, velocity, press, sight, particles, contact, moments))
+    RunForces<D> found;
+    const auto cell = static_cast<Index>(run.cell);
+    const Sight<D> sight = sight_of<D>(contact, cell, travelled, extremes);
+    if (!press_run<G, D>(mesh, run, velocity, press, sight, water, particles, contact, found))
       continue;
     touched = true;
-    for (int k = 0; k <= D; ++k)
-      for (int i = 0; i < D; ++i)
-        forces[static_cast<std::size_t>(mesh.cells[run.cell][k])][i] +=
-            at_vertex<D>(moments.force[i], moments.force_xi[i], mesh.shapes[run.cell].gradient[k]);
+    add_to_nodes<D>(mesh, cell, found.all, forces);
+    if (!water)
+      continue;
+    add_to_nodes<D>(mesh, cell, found.on_water, water->forces);
+    add_to_nodes<D>(mesh, cell, found.normal, water->normals);
   }
   return touched;
 }
 
 #define INSTANTIATE(G)                                                                                                 \
-  template bool add_contact_forces<G, G::dim>(const Mesh<G::dim>&, const std::vector<Run>&, const Movers&,             \
-                                              std::span<const Vector<G::dim>>, double, Particles<G::dim>&,             \
-                                              Contact<G::dim>&, std::span<Vector<G::dim>>);
+  template bool add_contact_forces<G, G::dim>(                                                                         \
+      const Mesh<G::dim>&, const std::vector<Run>&, const Movers&, std::span<const Vector<G::dim>>, double,            \
+      Particles<G::dim>&, Contact<G::dim>&, std::span<Vector<G::dim>>, const WaterBeside<G::dim>*);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

@@ -156,7 +156,7 @@ void find_phase_accelerations(const Vector<G::dim>& gravity, double damping, dou
 {
   constexpr int D = G::dim;
   EntryOf support_of(soil.supports);
-  EntryOf side_of(water.impervious);
+  EntryOf side_of(water.closed);
   for (Index i : soil.part.nodes)
   {
     if (is_light(soil, i))
@@ -207,7 +207,7 @@ void close_sides(const VelocityField<G>& soil, const WaterField<G>& water, std::
 {
   constexpr int D = G::dim;
   EntryOf support_of(soil.supports);
-  for (const ImperviousNode<D>& side : water.impervious)
+  for (const ImperviousNode<D>& side : water.closed)
   {
     const Index i = side.node;
     if (!soil.part.has_node[i] || is_light(soil, i))

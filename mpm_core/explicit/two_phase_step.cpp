@@ -9,6 +9,7 @@
 #include "model/resting_nodes.h"
 #include "model/water_mapping.h"
 #include "model/water_pass.h"
+#include "model/wet_contacts.h"
 
 #include <cmath>
 
@@ -32,6 +33,7 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
   find_start_velocity(soil);
   find_start_velocity(water.motion);
   follow_supports<G>(soil, water.motion, water.motion.start_velocity);
+  add_wet_contact_forces(model, dt);
   close_sides<G>(soil, water, soil.start_velocity, water.motion.start_velocity);
   // Momentum balance of both phases, coupled by the drag at the step's end
   clock.begin(Phase::momentum);

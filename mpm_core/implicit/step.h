@@ -47,16 +47,6 @@ std::array<std::array<double, n_gradient<G>>, D> gradient_rows(const CellShape<D
   return rows;
 }
 
-/// Derivative of the volumetric strain of a cell by the displacement of vertex k.
-template <class G, int D = G::dim>
-Vector<D> dilation_gradient(const CellShape<D>& shape, int k)
-{
-  Vector<D> gradient = shape.gradient[k];
-  if constexpr (G::has_hoop)
-    gradient[0] += hoop_gradient<G>(shape);
-  return gradient;
-}
-
 /// Derivatives of sum V sigma over the particles of a cell.
 template <class G>
 struct CellTangent

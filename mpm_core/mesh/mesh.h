@@ -98,6 +98,16 @@ inline double hoop_gradient(const CellShape<G::dim>& shape)
     return 0;
 }
 
+/// Derivative of the volumetric strain of a cell by the displacement of vertex k.
+template <class G, int D = G::dim>
+Vector<D> dilation_gradient(const CellShape<D>& shape, int k)
+{
+  Vector<D> gradient = shape.gradient[k];
+  if constexpr (G::has_hoop)
+    gradient[0] += hoop_gradient<G>(shape);
+  return gradient;
+}
+
 /// Smallest altitude of a cell [m], the length h of (16)
 template <int D>
 double smallest_altitude(const CellShape<D>& shape);

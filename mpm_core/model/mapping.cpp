@@ -121,7 +121,8 @@ template <class G, int D = G::dim>
 void average_stress_of_soils(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Run>& runs,
                              VelocityField<G>& field)
 {
-  find_averaged_fractions(mesh, exchange, runs, field);
+  if (!field.integration.fractions_given)
+    find_averaged_fractions(mesh, exchange, runs, field);
   average_mean_stress<G>(mesh, exchange, field, [&](Index c) { return mean_of<G>(integrated_stress(mesh, field, c)); });
 }
 } // namespace
@@ -161,6 +162,18 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
     scatter_particles(integrated, {});
     add_resting_sums(mesh, integrated, field);
   }
+}
+
+template <class G, int D>
+Working<G> acting_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
+{
+  Working<G> stress = field.moments[cell].stress;
+  for (double& component : stress)
+    component /= field.moments[cell].volume;
+  if (has_averaged_forces(field.integration))
+    for (int k : normal_component<G>)
+      stress[k] += change_by_averaging(mesh, field, cell) / integrated_volume(mesh, field, cell);
+  return stress;
 }
 
 template <class G>
@@ -283,6 +296,7 @@ void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField
 #define INSTANTIATE(G)                                                                                                 \
   template void particles_to_nodes(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&,                       \
                                    const std::vector<Run>&, VelocityField<G>&);                                        \
+  template Working<G> acting_stress(const Mesh<G::dim>&, const VelocityField<G>&, Index);                              \
   template void map_to_nodes(Model<G>&);                                                                               \
   template Vector<G::dim> mean_of_heavy_nodes(const Mesh<G::dim>&, const VelocityField<G>&,                            \
                                               const std::vector<Vector<G::dim>>&, Index);                              \

@@ -112,6 +112,11 @@ template <class G, int D = G::dim>
 void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Vector<G::dim>>& nodal, double dt,
                      VelocityField<G>& field);
 
+/// Mean stress of the particles of a cell as it acts on the nodes [Pa]: with averages where the forces have them.
+/// @pre `particles_to_nodes` has been called for the field
+template <class G, int D = G::dim>
+Working<G> acting_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell);
+
 /// Averages the mean of the normal components of the cells' stress times volume, as strains are averaged.
 ///
 /// The forces of these stresses do the work of the particles' stresses on averaged strains.

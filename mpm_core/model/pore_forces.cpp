@@ -54,7 +54,7 @@ void add_standing_forces(const Mesh<D>& mesh, const Particles<D>& particles, con
     for (int k = 0; k <= D; ++k)
       for (int a = 0; a < D; ++a)
         nodes[mesh.cells[run.cell][k]].traction[a] -=
-            pressure * mesh.shapes[run.cell].gradient[k][a] + volume[k] * standing.gradient[a];
+            pressure * dilation_gradient<G>(mesh.shapes[run.cell], k)[a] + volume[k] * standing.gradient[a];
   }
 }
 

@@ -104,13 +104,20 @@ template <class G, int D = G::dim>
 double shear_rate(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
 {
   const auto velocity = [&](Index i) -> const Vector<D>& { return field.velocity[i]; };
-  const Matrix<D> gradient = affine_field<D>(mesh, cell, velocity).gradient;
+  const AffineField<D> velocity_field = affine_field<D>(mesh, cell, velocity);
+  const Matrix<D>& gradient = velocity_field.gradient;
   double trace = 0, square = 0;
   for (int a = 0; a < D; ++a)
   {
     trace += gradient[a][a];
     for (int b = 0; b < D; ++b)
       square += 0.5 * gradient[a][b] * (gradient[a][b] + gradient[b][a]);
+  }
+  if constexpr (G::has_hoop)
+  {
+    const double hoop = velocity_field.value[0] / mesh.shapes[cell].centre[0];
+    trace += hoop;
+    square += hoop * hoop;
   }
   return std::sqrt(std::max(0.0, 2 * (square - trace * trace / 3)));
 }

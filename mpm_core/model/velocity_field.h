@@ -56,6 +56,7 @@ struct CellIntegration
   std::vector<double> averaged_by_law;
   /// Strains are averaged in full wherever forces are averaged, by whatever fraction.
   bool strains_in_full = false;
+  bool fractions_given = false;         ///< whether `averaged_of_cell` is that of another field
   std::vector<double> averaged_of_cell; ///< per owned cell: the fraction of averaging; empty where it is one everywhere
   std::vector<RelaxingCell<D>> relaxing;       ///< per owned cell, in explicit steps of undrained soil; else empty
   std::vector<NodeMass> masses;                ///< scratch, per node

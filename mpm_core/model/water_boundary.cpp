@@ -38,24 +38,6 @@ std::vector<FacetNormal<D>> nodal_normals(const Mesh<D>& mesh, NodeExchange& exc
   return normals;
 }
 
-/// Adds a direction, of which the part along those that are there already is left out.
-template <int D>
-void add_direction(Vector<D> n, ImperviousNode<D>& node)
-{
-  for (int k = 0; k < node.count; ++k)
-  {
-    const double along = dot<D>(n, node.direction[k]);
-    for (int a = 0; a < D; ++a)
-      n[a] -= along * node.direction[k][a];
-  }
-  const double length = norm<D>(n);
-  if (length < 1e-6)
-    return;
-  for (double& component : n)
-    component /= length;
-  node.direction[node.count++] = n;
-}
-
 /// The unit vector along a normal; all axes where facets meet under an angle.
 template <int D>
 void add_directions(const FacetNormal<D>& facets, ImperviousNode<D>& node)
@@ -72,6 +54,23 @@ void add_directions(const FacetNormal<D>& facets, ImperviousNode<D>& node)
   }
 }
 } // namespace
+
+template <int D>
+void add_direction(Vector<D> n, ImperviousNode<D>& node)
+{
+  for (int k = 0; k < node.count; ++k)
+  {
+    const double along = dot<D>(n, node.direction[k]);
+    for (int a = 0; a < D; ++a)
+      n[a] -= along * node.direction[k][a];
+  }
+  const double length = norm<D>(n);
+  if (length < 1e-6)
+    return;
+  for (double& component : n)
+    component /= length;
+  node.direction[node.count++] = n;
+}
 
 template <class G>
 void set_impervious(Model<G>& model, std::span<const Index> facet_tags, std::span<const Index> supplied_tags)
@@ -95,11 +94,21 @@ void set_impervious(Model<G>& model, std::span<const Index> facet_tags, std::spa
         add_directions<G::dim>(normals[i], by_node[i]);
       }
   }
-  model.water_field.impervious.clear();
+  for (Index i = 0; G::has_hoop && i < model.mesh.n_nodes(); ++i)
+    if (model.mesh.points[i][0] == 0)
+    {
+      by_node[i].node = i;
+      add_direction<G::dim>({1}, by_node[i]);
+    }
+  WaterField<G>& water = model.water_field;
+  water.impervious.clear();
   for (const auto& [node, impervious] : by_node)
-    model.water_field.impervious.push_back(impervious);
+    water.impervious.push_back(impervious);
+  water.closed = water.impervious;
 }
 
+template void add_direction<2>(Vector<2>, ImperviousNode<2>&);
+template void add_direction<3>(Vector<3>, ImperviousNode<3>&);
 #define INSTANTIATE(G) template void set_impervious(Model<G>&, std::span<const Index>, std::span<const Index>);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

@@ -6,6 +6,10 @@
 
 namespace mpm::model
 {
+/// Adds a direction along which a node is impervious, of which the part along those that are there already is left out.
+template <int D>
+void add_direction(Vector<D> n, ImperviousNode<D>& node);
+
 /// Makes facets with these tags impervious, in the place of those that were: there (w - v) . n = 0 for the normal n of
 /// the facets. Where facets of a tag meet at a node under an angle, w = v.
 /// @param supplied_tags  facets where water may enter

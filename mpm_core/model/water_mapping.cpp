@@ -177,6 +177,10 @@ void follow_soil(const Mesh<G::dim>& mesh, const VelocityField<G>& soil, WaterFi
   motion.least_mass = soil.least_mass;
   motion.integration.kind = soil.integration.kind;
   motion.integration.averaged_by_law.assign(soil.integration.averaged_by_law.size(), 1.0); // pressures in full
+  motion.integration.fractions_given = true; // where the soil's strains are averaged, so that both see one volume
+  motion.integration.averaged_of_cell.resize(soil.integration.averaged_of_cell.size());
+  for (std::size_t c = 0; c < soil.integration.averaged_of_cell.size(); ++c)
+    motion.integration.averaged_of_cell[c] = soil.integration.averaged_of_cell[c] > 0 ? 1 : 0;
   motion.moments.resize(cells);
   motion.nodes.resize(nodes);
   motion.volumetric_strain.resize(nodes);
@@ -229,10 +233,11 @@ void water_to_nodes(const Mesh<G::dim>& mesh, NodeExchange& exchange, const Part
     for (int k = 0; k <= D; ++k)
     {
       const Vector<D>& gradient = mesh.shapes[c].gradient[k];
+      const Vector<D> dilation = dilation_gradient<G>(mesh.shapes[c], k);
       PoreNode<D>& node = field.nodes[mesh.cells[c][k]];
       node.around += motion.moments[c].volume * norm<D>(gradient);
       for (int a = 0; a < D; ++a)
-        node.outward[a] += motion.moments[c].volume * gradient[a];
+        node.outward[a] += motion.moments[c].volume * dilation[a];
       node.volume += at_vertex<D>(motion.moments[c].volume, field.cells[c].volume_xi, gradient);
       const double drag = at_vertex<D>(field.cells[c].drag, field.cells[c].drag_xi, gradient);
       node.drag += drag;
@@ -243,16 +248,12 @@ void water_to_nodes(const Mesh<G::dim>& mesh, NodeExchange& exchange, const Part
 
 namespace
 {
-/// Part of the surface of its cells that a node needs to be one of the free surface. Nodes within the soil have less,
-/// by the error of integration over particles; on a plane surface of squares cut in two it is 0.6.
-constexpr double at_surface = 0.25;
-
 /// Takes the part of a flux out that enters the soil at a free surface.
 template <int D>
 void keep_out(const PoreNode<D>& node, Vector<D>& flux)
 {
   const double length = norm<D>(node.outward), inwards = -dot<D>(flux, node.outward);
-  if (length < at_surface * node.around || inwards <= 0)
+  if (!is_at_surface<D>(node) || inwards <= 0)
     return;
   for (int a = 0; a < D; ++a)
     flux[a] += inwards / (length * length) * node.outward[a];
@@ -280,14 +281,16 @@ double outflow(const Mesh<G::dim>& mesh, const WaterField<G>& field, Index cell,
 {
   double divergence = 0;
   for (int k = 0; k <= G::dim; ++k)
-    divergence += dot<G::dim>(field.flux[mesh.cells[cell][k]], mesh.shapes[cell].gradient[k]);
+    divergence += dot<G::dim>(field.flux[mesh.cells[cell][k]], dilation_gradient<G>(mesh.shapes[cell], k));
   return dt * divergence;
 }
 
 template <class G>
 void average_outflow(const Mesh<G::dim>& mesh, NodeExchange& exchange, double dt, WaterField<G>& field)
 {
-  const auto volume_of = [&](Index c) { return field.motion.moments[c].volume; }; // so that no water is lost or made
+  // by the volumes of the particles, so that no water is lost or made
+  const auto volume_of = [&](Index c)
+  { return averaged_strain_fraction(field.motion.integration, c) * field.motion.moments[c].volume; };
   const auto outflow_of = [&](Index c, double volume) { return volume * outflow(mesh, field, c, dt); };
   average_over_nodes(mesh, field.motion.part, volume_of, outflow_of, exchange, field.motion.volumetric_strain);
 }
@@ -322,12 +325,21 @@ std::vector<double> averaged_pressures(Model<G>& model)
   return pressures;
 }
 
+template <class G>
+double averaged_outflow(const Mesh<G::dim>& mesh, const WaterField<G>& field, Index cell, double dt)
+{
+  const double own = outflow(mesh, field, cell, dt);
+  const double mean = mean_of_nodes<G::dim>(mesh.cells[cell], field.motion.volumetric_strain);
+  return own + averaged_strain_fraction(field.motion.integration, cell) * (mean - own);
+}
+
 #define INSTANTIATE(G)                                                                                                 \
   template void fill_pores(Model<G>&);                                                                                 \
   template void split_phases(Model<G>&);                                                                               \
   template void water_to_nodes(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&, const std::vector<Run>&,  \
                                const PoreWater&, const VelocityField<G>&, WaterField<G>&);                             \
   template void find_flux(const Mesh<G::dim>&, const VelocityField<G>&, const PoreWater&, WaterField<G>&);             \
+  template double averaged_outflow(const Mesh<G::dim>&, const WaterField<G>&, Index, double);                          \
   template double outflow(const Mesh<G::dim>&, const WaterField<G>&, Index, double);                                   \
   template std::vector<double> averaged_pressures(Model<G>&);                                                          \
   template void average_outflow(const Mesh<G::dim>&, NodeExchange&, double, WaterField<G>&);

@@ -43,7 +43,8 @@ WaterChange<D> water_change(const Mesh<D>& mesh, const VelocityField<G>& soil, c
   const auto change = [&](Index i) -> const Vector<D>& { return water.motion.velocity_change[i]; };
   double divergence = 0;
   for (int k = 0; k <= D; ++k)
-    divergence += dot<D>(value_of_vertex(mesh, soil, soil.velocity, cell, k), mesh.shapes[cell].gradient[k]);
+    divergence +=
+        dot<D>(value_of_vertex(mesh, soil, soil.velocity, cell, k), dilation_gradient<G>(mesh.shapes[cell], k));
   const CellMoments<G>& moments = water.motion.moments[cell];
   const PoreMoments<D>& pores = water.cells[cell];
   const double content = moments.mass / pores.pores;
@@ -52,7 +53,7 @@ WaterChange<D> water_change(const Mesh<D>& mesh, const VelocityField<G>& soil, c
   for (int a = 0; a < D; ++a)
     exchange[a] = spread * (moments.momentum[a] - content * pores.pore_velocity[a]) / moments.mass;
   return {nmd ? averaged_strain(mesh, soil, cell, dt * divergence) : dt * divergence,
-          nmd ? mean_of_nodes<D>(mesh.cells[cell], water.motion.volumetric_strain) : outflow(mesh, water, cell, dt),
+          nmd ? averaged_outflow(mesh, water, cell, dt) : outflow(mesh, water, cell, dt),
           spread,
           content,
           exchange,

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
-from partitions import all_by_id, assert_same, bands, one_does_all, scattered, sliding_slope
+from partitions import all_by_id, assert_same, bands, one_does_all, scattered, sliding_slope, spread_box
+
+import mpm_core as mpm
 
 FIELDS = (
     "position",
@@ -68,3 +70,38 @@ def test_a_restart_is_the_run_that_never_stopped(comm, tmp_path):
     for name, values in all_by_id(model, FIELDS).items():
         np.testing.assert_array_equal(all_by_id(again, FIELDS)[name], values, err_msg=name)
     assert again.report().drag_work == model.report().drag_work
+
+
+def wet_block(comm, geometry, owners_of=bands):
+    """A saturated block that slides, or a ring that spreads, on a polyline towards a disc, across the borders of the ranks."""
+    mesh = spread_box((24, 10), (6.0, 2.5), comm, owners_of, diagonals="alternating")
+    soil = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=500.0, friction_angle=25.0)
+    model = mpm.Model(mesh, soil, geometry=geometry)
+    grid = 0.0625 * (np.indices((16, 8)).reshape(2, -1).T + 0.5) + (1.013, 1.007)
+    radius = grid[:, 0] if geometry == mpm.Geometry.AXISYMMETRIC else np.ones(len(grid))
+    model.seed_points(grid, 0.0625**2 * radius, density=2000.0)
+    model.set_gravity((0.0 if geometry == mpm.Geometry.AXISYMMETRIC else 4.0, -9.0))
+    ground = model.add_contact(mpm.Polyline([(0.5, 0.99), (3.0, 0.95), (5.5, 0.7)]), friction=0.2)
+    disc = model.add_contact(mpm.Disc((2.4, 1.2), 0.25), friction=0.4, velocity=(-0.5, 0.0))
+    model.add_water(porosity=0.4, conductivity=1e-3, modulus=4e6, suction_limit=0.0)
+    model.set_pore_pressure(lambda x: 9810.0 * (1.5 - x[:, 1]))
+    return model, ground, disc
+
+
+@pytest.mark.parametrize("geometry", [mpm.Geometry.PLANE_STRAIN, mpm.Geometry.AXISYMMETRIC])
+def test_two_phases_on_rigid_surfaces_are_the_same_on_any_partition(comm, geometry, shared_path):
+    runs = [wet_block(comm, geometry, scattered), wet_block(MPI.COMM_SELF, geometry)]
+    for model, *_ in runs:
+        slide(model, 0.15)
+    names = (*FIELDS, "contact_slip_0", "contact_slip_1")
+    assert_same(all_by_id(runs[0][0], names), all_by_id(runs[1][0], names), 1e-7)
+    for one, other in zip(runs[0][1:], runs[1][1:], strict=True):
+        assert one.impulse == pytest.approx(other.impulse, rel=1e-7)
+    path = shared_path / "wet.h5"
+    runs[0][0].save(path)
+    slide(runs[0][0], 0.2)
+    again, *_ = wet_block(comm, geometry, scattered)
+    again.restore(path)
+    slide(again, 0.2)
+    for name, values in all_by_id(runs[0][0], names).items():
+        np.testing.assert_array_equal(all_by_id(again, names)[name], values, err_msg=name)

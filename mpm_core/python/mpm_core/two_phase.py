@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ._core import Geometry, InputError, Integration, StressUpdate
+from ._core import InputError, Integration, StressUpdate
 from .rayleigh import Rayleigh
 
 if TYPE_CHECKING:
@@ -32,9 +32,7 @@ def set_impervious(body: Body) -> None:
 
 def _require_two_phases(model: Model, integration: Any, stress_update: Any, rayleigh: Rayleigh) -> None:
     refused = {
-        "axial symmetry": model.geometry == Geometry.AXISYMMETRIC,
         "several velocity fields": max(model._velocity_fields) > 0,
-        "rigid surfaces": bool(model._contacts),
         "absorbing sides": bool(model._absorbing),
         "retention curves": model._core.water.may_dry,
         "Rayleigh damping": rayleigh.mass > 0 or rayleigh.stiffness > 0,

@@ -1,0 +1,100 @@
+#include "model/wet_contacts.h"
+
+#include "model/mapping.h"
+#include "model/pore_forces.h"
+#include "model/water_boundary.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+namespace mpm::model
+{
+namespace
+{
+/// Fraction of the normal stress on a surface that the water of a cell carries, without that which stands over the
+/// soil.
+template <class G, int D = G::dim>
+double water_fraction(const Model<G>& model, Index cell, const Vector<D>& normal)
+{
+  const CellShape<D>& shape = model.mesh.shapes[cell];
+  const auto standing = standing_water(model.mesh, *model.water, cell);
+  const Working<G> of_water = acting_stress(model.mesh, model.water_field.motion, cell);
+  const Working<G> of_soil = acting_stress(model.mesh, model.fields.front(), cell);
+  const double water = -of_water[0] - pressure_at<D>(standing, shape_functions<D>(shape, shape.centre));
+  double grains = 0;
+  for (int a = 0; a < D; ++a)
+    for (int b = 0; b < D; ++b)
+      grains -= normal[a] * of_soil[symmetric_index<D>(a, b)] * normal[b];
+  grains = std::max(grains, 0.0); // none where the soil is in tension
+  return water + grains > 0 ? std::min(1.0, water / (water + grains)) : 0;
+}
+
+/// Directions along which nodes are impervious.
+template <int D>
+using Closed = std::map<Index, ImperviousNode<D>>;
+
+/// Adds the normals of the nodes at the surface of the soil that a rigid surface presses.
+/// @param normals  normal forces at the nodes, which this sets to zero [N]
+template <class G, int D = G::dim>
+void close_pressed(const WaterField<G>& water, const std::vector<Index>& filled, std::vector<Vector<D>>& normals,
+                   Closed<D>& closed)
+{
+  for (Index i : filled)
+  {
+    Vector<D> normal = std::exchange(normals[i], {});
+    const double force = norm<D>(normal);
+    if (force == 0 || !is_at_surface<D>(water.nodes[i]))
+      continue;
+    for (double& component : normal)
+      component /= force;
+    ImperviousNode<D>& node = closed[i];
+    node.node = i;
+    add_direction<D>(normal, node);
+  }
+}
+} // namespace
+
+template <class G>
+void add_wet_contact_forces(Model<G>& model, double dt)
+{
+  constexpr int D = G::dim;
+  if (model.contacts.empty())
+    return;
+  VelocityField<G>& soil = model.fields.front();
+  WaterField<G>& water = model.water_field;
+  const auto fraction = [&](Index cell, const Vector<D>& normal) { return water_fraction<G, D>(model, cell, normal); };
+  const Movers movers{model.field_of_law, 0};
+  for (auto* forces : {&soil.contact_force, &water.motion.contact_force, &water.pressed})
+    forces->resize(soil.nodes.size());
+  const WaterBeside<D> beside{fraction, water.motion.contact_force, water.pressed};
+  Closed<D> closed;
+  for (const ImperviousNode<D>& node : water.impervious)
+    closed[node.node] = node;
+  for (auto& contact : model.contacts)
+  {
+    add_contact_forces<G, D>(model.mesh, model.order.runs, movers, soil.start_velocity, dt, model.particles, contact,
+                             soil.contact_force, &beside);
+    sum_shared(model.exchange, water.pressed);
+    close_pressed<G, D>(water, soil.part.nodes, water.pressed, closed);
+  }
+  water.closed.clear();
+  for (const auto& [node, impervious] : closed)
+    water.closed.push_back(impervious);
+  for (VelocityField<G>* phase : {&soil, &water.motion})
+  {
+    sum_shared(model.exchange, phase->contact_force);
+    for (Index i : soil.part.nodes)
+    {
+      for (int a = 0; a < D; ++a)
+        phase->nodes[i].traction[a] += phase->contact_force[i][a];
+      phase->contact_force[i] = {};
+    }
+  }
+}
+
+#define INSTANTIATE(G) template void add_wet_contact_forces(Model<G>&, double);
+INSTANTIATE(PlaneStrain)
+INSTANTIATE(Axisymmetric)
+INSTANTIATE(Solid)
+} // namespace mpm::model
