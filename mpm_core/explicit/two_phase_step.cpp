@@ -3,6 +3,7 @@
 #include "explicit/momentum.h"
 #include "explicit/particle_update.h"
 #include "explicit/phase_momentum.h"
+#include "model/absorbing.h"
 #include "model/mapping.h"
 #include "model/pore_forces.h"
 #include "model/pressure_relaxation.h"
@@ -35,6 +36,7 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
   follow_supports<G>(soil, water.motion, water.motion.start_velocity);
   add_wet_contact_forces(model, dt);
   close_sides<G>(soil, water, soil.start_velocity, water.motion.start_velocity);
+  add_dashpot_forces(mesh, gravity, model.time, dt, soil, &water.motion);
   // Momentum balance of both phases, coupled by the drag at the step's end
   clock.begin(Phase::momentum);
   find_phase_accelerations(gravity, options.damping, dt, density, soil, water);

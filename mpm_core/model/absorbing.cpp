@@ -24,31 +24,58 @@ struct NodeOfSide
   double is_rigid; ///< above zero where it is
 };
 
-/// Moduli of the soil in each owned cell, where there is some
-template <class G, int D = G::dim>
-std::vector<std::optional<WaveModuli>> moduli_of_cells(const Model<G>& model)
+/// Soil of a cell as waves see it: undrained where there is pore water.
+struct CellSoil
 {
-  std::vector<std::optional<WaveModuli>> moduli(static_cast<std::size_t>(model.mesh.owned_cells));
+  WaveModuli moduli;
+  double density; ///< with the water [kg/m3]
+};
+
+/// K_w / n of the particles of a run [Pa]; of incompressible water that explicit runs refuse, none.
+template <class G>
+double water_stiffness(const Model<G>& model, const Run& run)
+{
+  double volume = 0, pores = 0;
+  for (Index p = run.first; model.water && p < run.last; ++p)
+  {
+    volume += model.particles.volume[p];
+    pores += model.particles.volume[p] * model.particles.porosity[0][p];
+  }
+  return pores > 0 && std::isfinite(model.water->modulus) ? model.water->modulus * volume / pores : 0;
+}
+
+/// That of each owned cell, where there is some.
+template <class G, int D = G::dim>
+std::vector<std::optional<CellSoil>> soil_of_cells(const Model<G>& model)
+{
+  std::vector<std::optional<CellSoil>> soil(static_cast<std::size_t>(model.mesh.owned_cells));
+  const bool two_phases = has_two_phases(model);
   for (const MaterialPoints<D>& points : {material_points(model), resting_points(model)})
     for (const Run& run : points.runs)
-      moduli[static_cast<std::size_t>(run.cell)] = mean_moduli(points, run);
-  return moduli;
+    {
+      const CellMoments<G>& moments = model.fields.front().moments[run.cell];
+      const double mass = moments.mass + (two_phases ? model.water_field.motion.moments[run.cell].mass : 0);
+      WaveModuli moduli = mean_moduli(points, run);
+      moduli.p_wave += water_stiffness(model, run);
+      soil[static_cast<std::size_t>(run.cell)] = CellSoil{moduli, mass / moments.volume};
+    }
+  return soil;
 }
 
 /// Adds the facet of a cell opposite to vertex k: its vertices have equal parts of its area.
 template <int D>
-void add_facet(const Mesh<D>& mesh, const AbsorbingSide& side, Index cell, int k, double density,
-               const WaveModuli& of_soil, std::vector<NodeOfSide<D>>& nodes)
+void add_facet(const Mesh<D>& mesh, const AbsorbingSide& side, Index cell, int k, const CellSoil& soil,
+               std::vector<NodeOfSide<D>>& nodes)
 {
   const CellShape<D>& shape = mesh.shapes[cell];
   const double size = norm<D>(shape.gradient[k]), area = size * shape.volume; // D V |grad N_k| over D vertices
-  const double moduli[]{of_soil.p_wave, of_soil.shear};
+  const double moduli[]{soil.moduli.p_wave, soil.moduli.shear};
   const double given[]{side.normal_impedance, side.shear_impedance};
   const bool is_rigid = std::isinf(side.normal_impedance);
   std::array<double, 2> damping{}, stiffness{};
   for (int s = 0; s < 2 && !is_rigid; ++s)
   {
-    damping[s] = area * (given[s] > 0 ? given[s] : std::sqrt(density * moduli[s]));
+    damping[s] = area * (given[s] > 0 ? given[s] : std::sqrt(soil.density * moduli[s]));
     stiffness[s] = area * moduli[s] / side.thickness;
   }
   for (Index node : facet_nodes<D>(mesh.cells[cell], k))
@@ -68,18 +95,16 @@ void add_facet(const Mesh<D>& mesh, const AbsorbingSide& side, Index cell, int k
 
 /// @returns number of facets of soil on the side, of this rank
 template <class G, int D = G::dim>
-int add_side(const Model<G>& model, const AbsorbingSide& side, std::span<const std::optional<WaveModuli>> moduli,
+int add_side(const Model<G>& model, const AbsorbingSide& side, std::span<const std::optional<CellSoil>> soil,
              std::vector<NodeOfSide<D>>& nodes)
 {
   int facets = 0;
-  const auto& moments = model.fields.front().moments;
   for (Index c = 0; c < model.mesh.owned_cells; ++c)
     for (int k = 0; k <= D; ++k)
-      if (const auto& of_soil = moduli[static_cast<std::size_t>(c)];
-          of_soil && model.mesh.facet_tags[c][k] == side.facet_tag)
+      if (const auto& of_cell = soil[static_cast<std::size_t>(c)];
+          of_cell && model.mesh.facet_tags[c][k] == side.facet_tag)
       {
-        const double density = moments[c].mass / moments[c].volume;
-        add_facet<D>(model.mesh, side, c, k, density, *of_soil, nodes);
+        add_facet<D>(model.mesh, side, c, k, *of_cell, nodes);
         ++facets;
       }
   return facets;
@@ -90,14 +115,14 @@ int add_side(const Model<G>& model, const AbsorbingSide& side, std::span<const s
 /// @note Collective
 template <class G, int D = G::dim>
 void add_entries(Model<G>& model, std::span<const AbsorbingSide> sides, Index free_field,
-                 std::span<const std::optional<WaveModuli>> moduli)
+                 std::span<const std::optional<CellSoil>> soil)
 {
   std::vector<NodeOfSide<D>> nodes(model.mesh.points.size(), NodeOfSide<D>{});
   for (const AbsorbingSide& side : sides)
   {
     if (side.free_field != free_field)
       continue;
-    int facets = add_side<G>(model, side, moduli, nodes);
+    int facets = add_side<G>(model, side, soil, nodes);
     MPI_Allreduce(MPI_IN_PLACE, &facets, 1, MPI_INT, MPI_SUM, model.exchange.comm);
     if (facets == 0)
       throw InputError("facet_tag " + std::to_string(side.facet_tag) +
@@ -160,14 +185,40 @@ private:
   std::vector<std::vector<typename FreeField<D>::State>> _states; ///< at the heights of each free field
 };
 
-/// m a = R + f,  f = sum over entries of held - K u + A t - C (v + dt a / 2 - v_beside); or the a of a rigid side.
-/// @param residual  R [N]
-template <class G, int D = G::dim>
-Vector<D> acceleration(std::span<const DashpotNode<D>> entries, const Beside<G>& beside, double mass, double dt,
-                       const Vector<D>& residual, const Vector<D>& start)
+/// What moves at a node, and the force on it but for dashpots: the soil, and its water where that moves by itself.
+template <int D>
+struct MovingNode
 {
-  Eigen::Matrix<double, D, D> inertia = mass * Eigen::Matrix<double, D, D>::Identity();
-  Eigen::Matrix<double, D, 1> force = Eigen::Map<const Eigen::Matrix<double, D, 1>>(residual.data());
+  double mass;
+  Vector<D> velocity; ///< at the step's start
+  Vector<D> residual; ///< [N]
+};
+
+template <class G, int D = G::dim>
+MovingNode<D> moving_node(const VelocityField<G>& field, const VelocityField<G>* water, Index i,
+                          const Vector<G::dim>& gravity)
+{
+  MovingNode<D> node{field.nodes[i].mass, field.start_velocity[i], unbalanced_force<D>(field.nodes[i], gravity)};
+  if (!water)
+    return node;
+  const double of_water = is_light(*water, i) ? 0 : water->nodes[i].mass, mass = node.mass + of_water;
+  for (int a = 0; a < D; ++a)
+  {
+    node.residual[a] += of_water * gravity[a] - water->nodes[i].internal[a];
+    node.velocity[a] = (node.mass * node.velocity[a] + of_water * water->start_velocity[i][a]) / mass;
+  }
+  node.mass = mass;
+  return node;
+}
+
+/// m a = R + f,  f = sum over entries of held - K u + A t - C (v + dt a / 2 - v_beside); or the a of a rigid side.
+/// @param node  m, v and R
+template <class G, int D = G::dim>
+Vector<D> acceleration(std::span<const DashpotNode<D>> entries, const Beside<G>& beside, double dt,
+                       const MovingNode<D>& node)
+{
+  Eigen::Matrix<double, D, D> inertia = node.mass * Eigen::Matrix<double, D, D>::Identity();
+  Eigen::Matrix<double, D, 1> force = Eigen::Map<const Eigen::Matrix<double, D, 1>>(node.residual.data());
   Vector<D> found;
   for (const DashpotNode<D>& entry : entries)
   {
@@ -175,12 +226,12 @@ Vector<D> acceleration(std::span<const DashpotNode<D>> entries, const Beside<G>&
     if (entry.is_rigid)
     {
       for (int a = 0; a < D; ++a)
-        found[a] = (ground.velocity[a] - start[a]) / dt;
+        found[a] = (ground.velocity[a] - node.velocity[a]) / dt;
       return found;
     }
     Vector<D> against;
     for (int a = 0; a < D; ++a)
-      against[a] = start[a] - ground.velocity[a];
+      against[a] = node.velocity[a] - ground.velocity[a];
     const Vector<D> drag = product<D>(entry.damping, against), spring = product<D>(entry.stiffness, entry.displacement);
     inertia += 0.5 * dt * as_eigen<D>(entry.damping);
     for (int a = 0; a < D; ++a)
@@ -203,26 +254,27 @@ void set_absorbing_sides(Model<G>& model, std::span<const AbsorbingSide> sides, 
         "or three dimensions and one field");
   prepare(model);
   map_to_nodes(model);
-  const std::vector<std::optional<WaveModuli>> moduli = moduli_of_cells(model);
+  const std::vector<std::optional<CellSoil>> soil = soil_of_cells(model);
   std::set<Index> free_fields;
   for (const AbsorbingSide& side : sides)
     free_fields.insert(side.free_field);
   field.dashpots.clear();
   for (Index free_field : free_fields)
-    add_entries<G>(model, sides, free_field, moduli);
+    add_entries<G>(model, sides, free_field, soil);
+  const VelocityField<G>* water = has_two_phases(model) ? &model.water_field.motion : nullptr;
   std::ranges::stable_sort(field.dashpots, {}, &DashpotNode<D>::node);
   for_each_node<D>(field.dashpots,
                    [&](std::span<DashpotNode<D>> entries)
                    {
-                     const Vector<D> residual = unbalanced_force<D>(field.nodes[entries[0].node], gravity);
+                     const MovingNode<D> node = moving_node(field, water, entries[0].node, gravity);
                      for (int a = 0; a < D; ++a)
-                       entries[0].held[a] = -residual[a];
+                       entries[0].held[a] = -node.residual[a];
                    });
 }
 
 template <class G>
 void add_dashpot_forces(const Mesh<G::dim>& mesh, const Vector<G::dim>& gravity, double time, double dt,
-                        VelocityField<G>& field)
+                        VelocityField<G>& field, const VelocityField<G>* water)
 {
   constexpr int D = G::dim;
   const Beside<G> beside(mesh, field, time + 0.5 * dt);
@@ -230,14 +282,12 @@ void add_dashpot_forces(const Mesh<G::dim>& mesh, const Vector<G::dim>& gravity,
                    [&](std::span<const DashpotNode<D>> entries)
                    {
                      const Index i = entries[0].node;
-                     NodeSums<D>& node = field.nodes[i];
                      if (is_light(field, i))
                        return;
-                     const Vector<D> residual = unbalanced_force<D>(node, gravity);
-                     const Vector<D> found =
-                         acceleration<G, D>(entries, beside, node.mass, dt, residual, field.start_velocity[i]);
+                     const MovingNode<D> node = moving_node(field, water, i, gravity);
+                     const Vector<D> found = acceleration<G, D>(entries, beside, dt, node);
                      for (int a = 0; a < D; ++a)
-                       node.traction[a] += node.mass * found[a] - residual[a];
+                       field.nodes[i].traction[a] += node.mass * found[a] - node.residual[a];
                    });
 }
 
@@ -257,7 +307,8 @@ void move_springs(const Mesh<G::dim>& mesh, double time, double dt, VelocityFiel
 
 #define INSTANTIATE(G)                                                                                                 \
   template void set_absorbing_sides(Model<G>&, std::span<const AbsorbingSide>, const Vector<G::dim>&);                 \
-  template void add_dashpot_forces(const Mesh<G::dim>&, const Vector<G::dim>&, double, double, VelocityField<G>&);     \
+  template void add_dashpot_forces(const Mesh<G::dim>&, const Vector<G::dim>&, double, double, VelocityField<G>&,      \
+                                   const VelocityField<G>*);                                                           \
   template void move_springs(const Mesh<G::dim>&, double, double, VelocityField<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

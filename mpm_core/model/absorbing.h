@@ -18,7 +18,8 @@ struct AbsorbingSide
   Index free_field; ///< number of the free field beside it; `none` for the incoming wave
 };
 
-/// Puts dashpots and springs at the nodes on the facets of soil with the tags of these sides. Forces that hold these
+/// Puts dashpots and springs at the nodes on the facets of soil with the tags of these sides. Soil with pore water has
+/// the wave speeds and stiffnesses of undrained soil. Forces that hold these
 /// nodes now, under gravity [m/s2], are kept.
 /// @throws InputError on all ranks: several velocity fields, axial symmetry, a side where no soil is
 /// @note Collective
@@ -27,10 +28,12 @@ void set_absorbing_sides(Model<G>& model, std::span<const AbsorbingSide> sides, 
 
 /// Adds the forces of dashpots, springs and free fields over a step to the tractions at the nodes of a field. Dashpots
 /// take the mean over the step of the velocity that they lead to, so that they do not limit it.
+/// @param water  where it moves by itself: the forces act on soil and water as one mass, and are added to those of the
+///               soil
 /// @pre nodes have the sums of all ranks
 template <class G>
 void add_dashpot_forces(const Mesh<G::dim>& mesh, const Vector<G::dim>& gravity, double time, double dt,
-                        VelocityField<G>& field);
+                        VelocityField<G>& field, const VelocityField<G>* water = nullptr);
 
 /// Moves the springs with their nodes, relative to the free fields at a time.
 template <class G>

@@ -100,6 +100,14 @@ void set_impervious(Model<G>& model, std::span<const Index> facet_tags, std::spa
       by_node[i].node = i;
       add_direction<G::dim>({1}, by_node[i]);
     }
+  for (const DashpotNode<G::dim>& entry : model.fields.front().dashpots)
+    for (int a = 0; entry.is_rigid && a < G::dim; ++a)
+    {
+      Vector<G::dim> axis{};
+      axis[a] = 1;
+      by_node[entry.node].node = entry.node;
+      add_direction<G::dim>(axis, by_node[entry.node]);
+    }
   WaterField<G>& water = model.water_field;
   water.impervious.clear();
   for (const auto& [node, impervious] : by_node)

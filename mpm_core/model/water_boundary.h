@@ -11,7 +11,7 @@ template <int D>
 void add_direction(Vector<D> n, ImperviousNode<D>& node);
 
 /// Makes facets with these tags impervious, in the place of those that were: there (w - v) . n = 0 for the normal n of
-/// the facets. Where facets of a tag meet at a node under an angle, w = v.
+/// the facets. Where facets of a tag meet at a node under an angle, w = v, and at sides whose motion is prescribed.
 /// @param supplied_tags  facets where water may enter
 /// @note Collective
 template <class G>

@@ -105,3 +105,32 @@ def test_two_phases_on_rigid_surfaces_are_the_same_on_any_partition(comm, geomet
     slide(again, 0.2)
     for name, values in all_by_id(runs[0][0], names).items():
         np.testing.assert_array_equal(all_by_id(again, names)[name], values, err_msg=name)
+
+
+def shaken_site(comm, owners_of=bands):
+    """Saturated ground between free fields over an absorbing base, through which a wave comes."""
+    mesh = spread_box((16, 10), (1.6, 1.0), comm, owners_of, diagonals="alternating")
+    model = mpm.Model(mesh, mpm.MohrCoulomb(young=4e6, poisson=0.3, cohesion=200.0, friction_angle=25.0))
+    model.seed(density=2000.0, per_cell=3)
+    model.add_water(porosity=0.4, conductivity=1e-4, modulus=2.2e7)
+    model.set_pore_pressure(1e3)
+    model.absorb(3, thickness=20.0)
+    model.absorb((1, 2), free_field=True, thickness=20.0)
+    time = np.linspace(0.0, 0.05, 51)
+    model.shake(mpm.Motion(time, 0.1 * np.sin(np.pi * time / 0.05) ** 2), (1.0, 0.3))
+    return model
+
+
+def test_a_shaken_site_of_two_phases_is_the_same_on_any_partition(comm, shared_path):
+    model, alone = shaken_site(comm, scattered), shaken_site(MPI.COMM_SELF)
+    report, _ = slide(model, 0.06, damping=0.0), slide(alone, 0.06, damping=0.0)
+    assert report.plastic_fraction > 0 and report.kinetic_energy > 0.1
+    assert_same(all_by_id(model, FIELDS), all_by_id(alone, FIELDS), 1e-8)
+    path = shared_path / "shaken.h5"
+    model.save(path)
+    slide(model, 0.08, damping=0.0)
+    again = shaken_site(comm, scattered)
+    again.restore(path)
+    slide(again, 0.08, damping=0.0)
+    for name, values in all_by_id(model, FIELDS).items():
+        np.testing.assert_array_equal(all_by_id(again, FIELDS)[name], values, err_msg=name)

@@ -57,6 +57,9 @@ class AbsorbingSides:
         column of them does by the wave that `shake` or `drive` lets in through the base: dashpots and springs work against this
         motion, and the stresses that it makes act on the side. So a level site moves as if it had no sides.
 
+        Soil with pore water has the wave speeds and stiffnesses of undrained soil, and no water passes the side unless
+        `hold_pore_pressure` prescribes its pressure there. In a free field water does not flow through the soil.
+
         Args:
             facet_tag: facets with this tag, or these tags, by number or name, at cells with soil.
             thickness: of the ground behind the side that acts as springs, ``(lambda + 2 mu) / thickness`` along the normal and

@@ -73,8 +73,9 @@ def layers_at(model: Any, tag: int) -> Layers:
         coupled_mass=[coupled_mass(count, dim) for count in values[:, 1].round().astype(int)],
         density=values[:, 2].tolist(),
         cell_size=values[:, 3].tolist(),
-        stress=values[:, 4 : 4 + width].tolist(),
-        state=values[:, 4 + width :].tolist(),
+        water=values[:, 4].tolist(),
+        stress=values[:, 5 : 5 + width].tolist(),
+        state=values[:, 5 + width :].tolist(),
         normal=(normal / np.linalg.norm(normal)).tolist(),
         time=model.time,
     )
@@ -100,16 +101,28 @@ def _counts(model: Any) -> NDArray[np.float64]:
     return np.where(p.is_resting, represented(p), in_cell)
 
 
+def _mass(model: Any) -> NDArray[np.float64]:
+    """Mass of the particles with their water [kg], (n)."""
+    p = model.particles
+    return p.mass + p.water_mass if model._core.has_two_phases else p.mass
+
+
+def _water_stiffness(model: Any) -> NDArray[np.float64]:
+    """K_w / n of the particles [Pa], (n); 0 without pore water."""
+    p = model.particles
+    return np.zeros(len(p)) if model._core.water is None else model._core.water.modulus / p.porosity
+
+
 def _facets_of(model: Any, tag: int) -> tuple[NDArray, NDArray, NDArray]:
     """Of this rank's facets with soil: corners (m, D, D), outer normals (m, D), and sums over their cells (m, ...).
 
-    The sums are those of volume times 1, law, number of particles, density, cell size, stress and state.
+    The sums are those of volume times 1, law, number of particles, density, cell size, stiffness of the water, stress and state.
     """
     mesh, n, p = model.mesh, model.mesh.owned_cells, model.particles
     dim = mesh.dim
     values = np.column_stack(
-        [np.ones(len(p)), p.material, _counts(model), p.mass / p.volume, cell_sizes(mesh.cell_volumes, dim)[p.cell], p.stress,
-         p.state]
+        [np.ones(len(p)), p.material, _counts(model), _mass(model) / p.volume, cell_sizes(mesh.cell_volumes, dim)[p.cell],
+         _water_stiffness(model), p.stress, p.state]
     )  # fmt: skip
     sums = np.zeros((n, values.shape[1]))
     np.add.at(sums, p.cell, p.volume[:, None] * values)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ class Layers:
         state: state variables, (n, n_state) of the law with the most.
         cell_size: [m], (n).
         coupled_mass: fraction of a layer's mass by which one of its levels takes the velocity of the other, (n).
+        water: stiffness K_w / n of the pore water [Pa], (n), which does not drain; 0 or an empty list where there is none.
         normal: outer one of the side beside the column, (D).
         time: when it begins to move [s].
     """
@@ -44,6 +45,7 @@ class Layers:
     coupled_mass: list[float]
     normal: list[float]
     time: float
+    water: list[float] = field(default_factory=list)  # not in older checkpoints
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ class GroundColumn:
     """Level ground by linear finite elements over its height, in explicit steps of one length like those of a model.
 
     All points of a level move alike. The mass matrix of velocities is that of the particles, so that waves are as fast as in
-    the model. Strains are small: the column keeps its geometry, and stresses are not
+    the model. Pore water moves with the soil. Strains are small: the column keeps its geometry, and stresses are not
     rotated. Only what changes from the start counts, so that it begins in equilibrium.
 
     Args:
@@ -101,13 +103,16 @@ class GroundColumn:
         p_wave, shear = np.empty((2, n))
         for law, rows in self._pieces:
             p_wave[rows], shear[rows] = law.wave_moduli(self.stress[rows], self._state_of(law, rows)).T
+        self._water = np.array(layers.water) if layers.water else np.zeros(n)
+        self._pressure = np.zeros(n)  # of the water, since the start
+        p_wave += self._water
         self._moduli = np.column_stack([shear] * (dim - 1) + [p_wave])  # (n, D), across and along the column
         self._lame = p_wave - 2 * shear
         self._mass = self._density * self._thickness
         self._coupled = (self._mass * layers.coupled_mass)[:, None]
         self._own = 0.5 * self._mass[:, None] - self._coupled
         self._nodal_mass = self._to_levels(0.5 * self._mass, 0.5 * self._mass)
-        highest = np.maximum(p_wave, [laws[k].p_wave_modulus for k in self._law])  # as it may become
+        highest = np.maximum(p_wave, self._water + [laws[k].p_wave_modulus for k in self._law])  # as it may become
         critical = float((self._thickness * np.sqrt(self._density / highest)).min())
         self.dt = COURANT * rayleigh.time_step(critical)
         """Length of a step [s]"""
@@ -153,6 +158,12 @@ class GroundColumn:
         total[1:] += upper
         return total
 
+    def _change(self) -> Floats:
+        """Total stress since the start, (n, S)."""
+        change = self.stress - self._stress_start
+        change[:, :3] -= self._pressure[:, None]
+        return change
+
     def _rates(self) -> Floats:
         """Derivative of the velocity by height, (n, D)."""
         return np.diff(self.velocity, axis=0) / self._thickness[:, None]
@@ -176,7 +187,7 @@ class GroundColumn:
         """Take one step; returns the viscous stress at its start."""
         damped = self._is_damped()
         viscous = self._viscous_stress(damped)
-        on_plane = (self.stress - self._stress_start + viscous)[:, self._on_plane]
+        on_plane = (self._change() + viscous)[:, self._on_plane]
         force = self._to_levels(on_plane, -on_plane)
         if self._rayleigh.mass > 0:
             half = 0.5 * self._rayleigh.mass * self._mass * damped
@@ -210,6 +221,7 @@ class GroundColumn:
     def _strain(self) -> None:
         increment = np.zeros_like(self.stress)
         increment[:, self._on_plane] = self.dt * self._rates()
+        self._pressure -= self._water * increment[:, self._on_plane[-1]]
         for law, rows in self._pieces:
             if len(rows) == 0:
                 continue
@@ -224,7 +236,7 @@ class GroundColumn:
 
     def _tractions(self, viscous: Floats) -> Floats:
         """On the side, means of the layers around each level, (n + 1, D) [Pa]."""
-        change = self.stress - self._stress_start + viscous
+        change = self._change() + viscous
         traction = np.einsum("nij,j->ni", change[:, self._on_side], self._normal) * self._thickness[:, None]
         length = self._to_levels(self._thickness, self._thickness)
         return self._to_levels(traction, traction) / length[:, None]

@@ -27,13 +27,13 @@ def set_impervious(body: Body) -> None:
     """Let no water pass the facets that hold the soil, but for those with a prescribed pore pressure. Collective."""
     if body._core.water is not None:
         pervious = {tag for tag, _, _, held, _ in body._water_conditions if held}
-        body._core.set_impervious(sorted({tag for tag, _, _ in body._conditions} - pervious), sorted(pervious))
+        closed = {tag for tag, _, _ in body._conditions} | {side[0] for side in body._absorbing}
+        body._core.set_impervious(sorted(closed - pervious), sorted(pervious))
 
 
 def _require_two_phases(model: Model, integration: Any, stress_update: Any, rayleigh: Rayleigh) -> None:
     refused = {
         "several velocity fields": max(model._velocity_fields) > 0,
-        "absorbing sides": bool(model._absorbing),
         "retention curves": model._core.water.may_dry,
         "Rayleigh damping": rayleigh.mass > 0 or rayleigh.stiffness > 0,
         "DUAL_DOMAIN integration": integration == Integration.DUAL_DOMAIN,
