@@ -176,6 +176,31 @@ Working<G> acting_stress(const Mesh<D>& mesh, const VelocityField<G>& field, Ind
   return stress;
 }
 
+namespace
+{
+/// What water that moves by itself gives to the nodes, and the forces on soil and water together of that which stands
+/// over them; over all ranks.
+/// @pre the soil has given its part, of this rank
+/// @note Collective
+template <class G>
+void map_water_to_nodes(Model<G>& model)
+{
+  VelocityField<G>& soil = model.fields.front();
+  WaterField<G>& water = model.water_field;
+  water_to_nodes(model.mesh, model.exchange, model.particles, model.order.runs, *model.water, soil, water);
+  add_surface_pressures(model.mesh, *model.water, &PressureCondition::held, water.motion);
+  if (!model.water->standing.empty())
+    for (const auto* runs : {&model.order.runs, &soil.resting.runs})
+      for (auto* nodes : {&soil.nodes, &water.motion.nodes})
+        add_standing_forces<G>(model.mesh, model.particles, *model.water, *runs, water.motion, *nodes);
+  sum_shared(model.exchange, soil.nodes);
+  sum_shared(model.exchange, water.motion.nodes);
+  sum_shared(model.exchange, water.nodes);
+  if (!model.water->anisotropy.empty())
+    sum_shared(model.exchange, water.drag);
+}
+} // namespace
+
 template <class G>
 void map_to_nodes(Model<G>& model)
 {
@@ -187,25 +212,12 @@ void map_to_nodes(Model<G>& model)
       for (const auto* runs : {&model.order.runs, &field.resting.runs})
         add_pore_forces(model.mesh, model.particles, *model.water, *runs, field);
       add_surface_pressures(model.mesh, *model.water, &PressureCondition::presses, field);
-      if (has_two_phases(model) && !model.water->standing.empty())
-        for (const auto* runs : {&model.order.runs, &field.resting.runs})
-          add_standing_forces<G>(model.mesh, model.particles, *model.water, *runs, field.nodes);
     }
-    sum_shared(model.exchange, field.nodes);
+    if (!has_two_phases(model))
+      sum_shared(model.exchange, field.nodes);
   }
-  if (!has_two_phases(model))
-    return;
-  WaterField<G>& water = model.water_field;
-  water_to_nodes(model.mesh, model.exchange, model.particles, model.order.runs, *model.water, model.fields.front(),
-                 water);
-  add_surface_pressures(model.mesh, *model.water, &PressureCondition::held, water.motion);
-  if (!model.water->standing.empty())
-    for (const auto* runs : {&model.order.runs, &model.fields.front().resting.runs})
-      add_standing_forces<G>(model.mesh, model.particles, *model.water, *runs, water.motion.nodes);
-  sum_shared(model.exchange, water.motion.nodes);
-  sum_shared(model.exchange, water.nodes);
-  if (!model.water->anisotropy.empty())
-    sum_shared(model.exchange, water.drag);
+  if (has_two_phases(model))
+    map_water_to_nodes(model);
 }
 
 template <class G>

@@ -35,10 +35,11 @@ void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const P
 
 template <class G, int D>
 void add_standing_forces(const Mesh<D>& mesh, const Particles<D>& particles, const PoreWater& water,
-                         const std::vector<Run>& runs, Array<NodeSums<D>>& nodes)
+                         const std::vector<Run>& runs, const VelocityField<G>& field, Array<NodeSums<D>>& nodes)
 {
   for (const Run& run : runs)
   {
+    const double factor = integration_factor(mesh, field, run.cell);
     const auto standing = standing_water(mesh, water, run.cell);
     if (std::ranges::all_of(standing.pressure, [](double pressure) { return pressure == 0; }))
       continue;
@@ -47,7 +48,7 @@ void add_standing_forces(const Mesh<D>& mesh, const Particles<D>& particles, con
     for (Index p = run.first; p < run.last; ++p)
     {
       const auto n = shape_functions<D>(mesh.shapes[run.cell], at<D>(particles.position, p));
-      pressure += particles.volume[p] * pressure_at<D>(standing, n);
+      pressure += factor * particles.volume[p] * pressure_at<D>(standing, n);
       for (int k = 0; k <= D; ++k)
         volume[k] += particles.volume[p] * n[k];
     }
@@ -111,7 +112,7 @@ void add_surface_pressures(const Mesh<G::dim>& mesh, const PoreWater& water, boo
 
 #define INSTANTIATE(G)                                                                                                 \
   template void add_standing_forces<G>(const Mesh<G::dim>&, const Particles<G::dim>&, const PoreWater&,                \
-                                       const std::vector<Run>&, Array<NodeSums<G::dim>>&);                             \
+                                       const std::vector<Run>&, const VelocityField<G>&, Array<NodeSums<G::dim>>&);    \
   template void add_surface_pressures(const Mesh<G::dim>&, const PoreWater&, bool PressureCondition::*,                \
                                       VelocityField<G>&);                                                              \
   template void add_pore_forces(const Mesh<G::dim>&, const Particles<G::dim>&, const PoreWater&,                       \

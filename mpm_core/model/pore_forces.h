@@ -97,10 +97,11 @@ void add_pore_forces(const Mesh<D>& mesh, const Particles<D>& particles, const P
                      const std::vector<Run>& runs, VelocityField<G>& field);
 
 /// Adds the forces of water that stands over the free surface to the tractions, -sum V_p (p_s grad N + N grad p_s), of
-/// soil and water together; this rank's part.
+/// soil and water together; this rank's part. The pressures are integrated as those of the field of the water are, and
+/// the weight over the particles, as that of soil and water is.
 template <class G, int D = G::dim>
 void add_standing_forces(const Mesh<D>& mesh, const Particles<D>& particles, const PoreWater& water,
-                         const std::vector<Run>& runs, Array<NodeSums<D>>& nodes);
+                         const std::vector<Run>& runs, const VelocityField<G>& field, Array<NodeSums<D>>& nodes);
 
 /// Adds the forces of pressures on the surface of the soil to the tractions, those of standing water among them; this
 /// rank's part. On facets between filled cells those from both sides cancel.

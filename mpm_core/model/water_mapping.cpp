@@ -175,7 +175,9 @@ void follow_soil(const Mesh<G::dim>& mesh, const VelocityField<G>& soil, WaterFi
   const auto nodes = mesh.points.size(), cells = static_cast<std::size_t>(mesh.owned_cells);
   motion.part = soil.part;
   motion.least_mass = soil.least_mass;
-  motion.integration.kind = soil.integration.kind;
+  // Pressures of full cells over their volumes, whatever the soil does: sums over particles that are not spread evenly
+  // give a uniform pressure forces within the soil, which only a flow of the water could balance.
+  motion.integration.kind = Integration::mixed;
   motion.integration.averaged_by_law.assign(soil.integration.averaged_by_law.size(), 1.0); // pressures in full
   motion.integration.fractions_given = true; // where the soil's strains are averaged, so that both see one volume
   motion.integration.averaged_of_cell.resize(soil.integration.averaged_of_cell.size());

@@ -342,13 +342,43 @@ def test_soil_at_rest_under_water_has_its_buoyant_weight():
         np.testing.assert_allclose(means, weight * (1 - 0.2 * (np.arange(5) + 0.5)), atol=0.01 * weight)
 
 
+@pytest.mark.parametrize("nmd", [False, True])
+def test_water_rests_between_particles_that_are_not_spread_evenly(nmd):
+    """Places by chance, 16 in a square and so 4 to 12 in a triangle: forces of a pressure are those of whole cells. As sums over the
+    particles they are no equilibrium, and with averages the pressure would fall, as water flowed without end."""
+    model = mpm.Model(box([4, 10], [0.4, 1.0], diagonals="alternating"), ELASTIC)
+    squares = np.indices((16, 40)).reshape(2, -1).T
+    points = 0.025 * (squares + np.random.default_rng(1).uniform(0.05, 0.95, squares.shape))
+    model.seed_points(points, np.full(len(points), 0.025**2), density=DENSITY)
+    for side in (LEFT, RIGHT):
+        model.roller(side, (1, 0))
+    model.fix(BASE)
+    model.set_gravity((0.0, -9.81))
+    model.add_water(porosity=POROSITY, conductivity=1e-2, modulus=2.2e7, suction_limit=0.0)
+    model.set_pore_pressure(lambda x: GAMMA * (1 - x[:, 1]))
+    vertical = (DENSITY / WATER - 1) * GAMMA * (points[:, 1:] - 1)
+    model.particles.set("stress", vertical * [3 / 7, 1.0, 3 / 7, 0.0])
+    model.explicit(0.3, nmd=nmd, damping=0.1).last()
+    p = model.averaged_pore_pressure() if nmd else model.particles.pore_pressure
+    height = np.asarray(model.mesh.points)[model.mesh.cells[model.particles.cell], 1].mean(axis=1)
+    assert p == pytest.approx(GAMMA * (1 - height), abs=0.03 * GAMMA)
+
+
+@pytest.mark.parametrize("evenly", [True, False])
 @pytest.mark.parametrize("suction_limit", [np.inf, 0.0])
-def test_water_that_stands_over_a_slope_carries_soil_as_heavy_as_itself(suction_limit):
-    """Whatever the shape of its surface, which cuts cells: no effective stress, no motion, the pressures of the water."""
+def test_water_that_stands_over_a_slope_carries_soil_as_heavy_as_itself(suction_limit, evenly):
+    """Whatever the shape of its surface, which cuts cells: no effective stress, no motion, the pressures of the water. Energy
+    is complete where the triangles within the soil are filled evenly, since its pressures are integrated over whole cells.
+    """
     mesh = box([16, 8], [2.0, 1.0], diagonals="alternating")
     model = mpm.Model(mesh, mpm.LinearElastic(young=10e6, poisson=0.3))
     x, y = (np.arange(64) + 0.5) / 32, (np.arange(32) + 0.5) / 32
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2) + [1e-3, 2e-3]
+    if evenly:
+        points += np.where(np.rint(points[:, 1:] * 32 - 0.5) % 2, 6e-3, -6e-3) * [1, 0] - [
+            1e-3,
+            2e-3,
+        ]  # none on a diagonal
     points = points[points[:, 1] < 0.9 - 0.5 * np.minimum(points[:, 0], 1.2)]
     model.seed_points(points, np.full(len(points), 1 / 32**2), density=1000.0)
     model.roller(1, (1, 0))
@@ -362,15 +392,18 @@ def test_water_that_stands_over_a_slope_carries_soil_as_heavy_as_itself(suction_
     model.stand_water(1.5)
     report = model.explicit(0.3, nmd=True).last()
     p = model.particles
-    assert np.abs(p.stress).max() < 0.02 * 9810.0 and np.linalg.norm(p.displacement, axis=1).max() < 1e-5
-    np.testing.assert_allclose(
-        p.pore_pressure, 9810.0 * (1.5 - p.position[:, 1]), atol=9810.0 / 7
-    )  # one value in each cell
+    moved = np.linalg.norm(p.displacement, axis=1).max()
+    assert np.abs(p.stress).max() < 0.02 * 9810.0 and moved < 1e-5
+    height = np.asarray(model.mesh.points)[model.mesh.cells[p.cell], 1].mean(axis=1)
+    # to two thirds of the height of a cell: a single particle may be so far from its centre
+    assert model.averaged_pore_pressure() == pytest.approx(9810.0 * (1.5 - height), abs=9810.0 / 12 + 50.0)
     assert abs(model.water_inflow()) < 1e-4 * model.water_volume()
-    assert report.unexplained_fraction == pytest.approx(0.0, abs=3e-5)  # of water at fixed nodes, whose particles move
+    assert not evenly or report.unexplained_fraction == pytest.approx(
+        0.0, abs=3e-5
+    )  # of water at fixed nodes, whose particles move
     model.stand_water(-1.0)  # without it the weight of the soil acts
     model.explicit(0.4, nmd=True).last()
-    assert np.linalg.norm(p.displacement, axis=1).max() > 1e-4
+    assert np.linalg.norm(p.displacement, axis=1).max() > 10 * moved
 
 
 # --- pores that run empty ---------------------------------------------------------------------------------------------
