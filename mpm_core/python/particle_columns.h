@@ -166,17 +166,20 @@ py::object column(const Model<G>& model, const std::string& name, const ChosenRo
 }
 
 /// Copies of fields by name, real ones in single or double precision, column by column; the position is always there.
-/// @param padded  two components become rows of three, as files store vectors
+/// @param padded  the two components of a vector become rows of three, as files store them
 /// @throws InputError for a field that does not exist, or that no particle carries
 template <class G, int D = G::dim>
 py::dict copied_fields(const Model<G>& model, const std::vector<std::string>& names, bool single, bool padded)
 {
   py::dict copies;
-  const auto copied = [&]<class T>(const FieldView& view, T)
-  { return padded && view.components.size() == 2 ? padded_field<T>(view) : copied_field<T>(view, true); };
   for_each_view(model.particles, names,
                 [&](const std::string& name, const auto& view)
                 {
+                  const auto copied = [&]<class T>(const FieldView& field, T)
+                  {
+                    const bool is_vector = field.components.size() == 2 && name != "state";
+                    return padded && is_vector ? padded_field<T>(field) : copied_field<T>(field, true);
+                  };
                   if constexpr (std::is_same_v<std::remove_cvref_t<decltype(view)>, IndexView>)
                     copies[py::str(name)] = copied_field(view);
                   else if (single)

@@ -8,7 +8,8 @@ as ``000012-1.h5``, to which the first has links. The folder of a mesh also has 
 Fields are arrays of shape (n,) or (n, k). Two components are padded to three, so that they are vectors to ParaView; four
 and six components are a symmetric tensor, ``xx yy zz xy`` (of particles in axial symmetry ``xx yy hoop xy``) or
 ``xx yy zz xy yz xz``, and become one dataset for each component, ``NAME_xx`` and so on; a field of four of which the name ends
-with ``_gradient`` has the components ``xx xy yx yy``. Other numbers of components are kept as they are.
+with ``_gradient`` has the components ``xx xy yx yy``. The state variables of the field ``state`` are ``state_0``, ``state_1`` and
+so on, in the order of the ``state_names`` of a law. Other numbers of components are kept as they are.
 Names consist of letters, digits, ``_`` and ``-``.
 """
 

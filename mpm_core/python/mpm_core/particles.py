@@ -130,14 +130,15 @@ class Particles:
 
         Args:
             names: fields, one column for each component: ``position_x``, ``stress_xx``, in axial symmetry ``stress_hoop`` in the
-                place of ``stress_zz``, ``velocity_gradient_xy`` for dv_x/dy; without any, position, displacement, velocity,
-                stress and plastic strain.
+                place of ``stress_zz``, ``velocity_gradient_xy`` for dv_x/dy, ``state_0`` for the first of the ``state_names`` of
+                a law; without any, position, displacement, velocity, stress and plastic strain.
 
         Returns:
             pandas.DataFrame; its ``attrs["units"]`` has the unit of each column.
 
         Raises:
             AttributeError: a field that does not exist.
+            InputError: an optional field that no particle has yet.
             ImportError: pandas is not installed.
 
         Example:
@@ -154,6 +155,7 @@ class Particles:
 
         Raises:
             AttributeError: a field that does not exist.
+            InputError: an optional field that no particle has yet.
             ImportError: meshio is not installed.
         """
         return particle_mesh(self, names or SHOWN)
@@ -169,7 +171,7 @@ class Particles:
             The axes. In two dimensions particles are circles that cover the soil, in three points.
 
         Raises:
-            InputError: no such field or component; the message lists them.
+            InputError: no such field or component; the message lists them. Or an optional field that no particle has yet.
             ImportError: matplotlib is not installed.
 
         Example:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ._core import InputError, RunError
 from .collective import check_same_path, collectively, write_on_first_rank, written
-from .components import tensor_components
+from .components import STATE, tensor_components
 from .hdf5 import RowsFile
 
 _TYPES = {1: "Scalar", 3: "Vector", 9: "Tensor"}
@@ -347,7 +347,7 @@ class Frame:
     def add_field(
         self, name: str, center: str, values: NDArray[Any], counts: Sequence[int], axisymmetric: bool = False
     ) -> None:
-        """Add a field on nodes or cells: a tensor by its components, other real numbers as they are; whole ones as given.
+        """Add a field on nodes or cells: a tensor by its components, states by number, other real numbers as they are.
 
         Args:
             name: of the field.
@@ -357,7 +357,8 @@ class Frame:
             axisymmetric: whether the third of four components of a symmetric tensor is that of the hoop.
         """
         width = values.shape[1] if values.ndim == 2 else 1
-        components = tensor_components(name, width, axisymmetric) if width != 9 else None  # XDMF has tensors of nine
+        whole = values.ndim == 1 or width == 9 and name != STATE  # XDMF has tensors of nine
+        components = None if whole else tensor_components(name, width, axisymmetric)
         if components:
             for k, component in enumerate(components):
                 self.add_field(f"{name}_{component}", center, values[:, k], counts)

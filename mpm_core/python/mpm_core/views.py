@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ._core import Geometry, InputError
-from .components import AXES, tensor_components
+from .components import AXES, is_vector, tensor_components
 
 if TYPE_CHECKING:
     from .mesh import Mesh
@@ -101,14 +101,22 @@ def report_text(report: Report) -> str:
     )
 
 
+def _values(particles: Particles, name: str) -> np.ndarray:
+    """A field of all particles; InputError for an optional one that none of them has yet."""
+    values = np.asarray(getattr(particles, name))
+    if len(values) != len(particles):
+        raise InputError(f"particle field is {name!r}, but no particle carries one")
+    return values
+
+
 def _columns(particles: Particles, name: str) -> dict[str, np.ndarray]:
     """A field as columns with one number per particle."""
-    values = np.asarray(getattr(particles, name))
+    values = _values(particles, name)
     if values.ndim == 1:
         return {name: values}
     width, dim = values.shape[1], particles.position.shape[1]
     tensor = tensor_components(name, width, particles._geometry == Geometry.AXISYMMETRIC)
-    ends = AXES[dim] if width == dim else tensor or range(width)
+    ends = AXES[dim] if is_vector(name, width, dim) else tensor or range(width)
     return {f"{name}_{end}": values[:, k] for k, end in enumerate(ends)}
 
 
@@ -139,8 +147,8 @@ def particle_mesh(particles: Particles, names: Sequence[str]) -> Any:
 
     dim, fields = particles.position.shape[1], {}
     for name in names:
-        values = np.array(getattr(particles, name))
-        if values.shape[1:] == (dim,):
+        values = _values(particles, name)
+        if values.ndim == 2 and is_vector(name, values.shape[1], dim):
             fields[name] = _in_space(values)
         else:
             fields |= _columns(particles, name)
@@ -160,9 +168,9 @@ def _plotted(particles: Particles, name: str) -> tuple[np.ndarray, str]:
     for field in sorted(units, key=len, reverse=True):
         if name != field and not name.startswith(f"{field}_"):
             continue
-        values = np.asarray(getattr(particles, field))
+        values = _values(particles, field)
         columns = _columns(particles, field)
-        if name not in columns and name == field and values.ndim == 2 and values.shape[1] == dim:
+        if name not in columns and name == field and is_vector(field, values.shape[-1], dim):
             columns = {name: np.linalg.norm(values, axis=1)}
         if name not in columns:
             raise InputError(f"name is {name!r}, expected one of {', '.join(columns)}")

@@ -101,6 +101,47 @@ def test_components_of_tensors_have_their_names(model, tmp_path):
     assert fields["velocity"].shape == (len(revolved.particles), 3)  # a vector, also for ParaView
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("variables", [1, 2, 3, 4, 6, 9])
+def test_state_variables_are_numbered_however_many_there_are(dim, variables, tmp_path):
+    """Two are no vector in the plane, three none in space, four, six and nine no tensor."""
+
+    class Elastic:
+        n_state, p_wave_modulus = variables, 1e6
+
+        def update(self, *points):
+            pass
+
+    model = mpm.Model(box((2,) * dim), mpm.PythonLaw(Elastic()))
+    model.seed(density=2000.0, per_cell=dim + 1)
+    p = model.particles
+    state = np.arange(1.0, len(p) * variables + 1).reshape(-1, variables)
+    p.set("state", state)
+    names = [f"state_{number}" for number in range(variables)]
+    table = p.to_dataframe("state")
+    assert list(table) == names
+    np.testing.assert_array_equal(table, state)
+    assert list(p.to_meshio("state").point_data) == names
+    drawn = p.plot(names[-1]).collections[0].get_array()
+    np.testing.assert_array_equal(drawn, state[:, -1])
+    with pytest.raises(mpm.InputError, match="'state', expected one of state_0"):
+        p.plot("state")
+    with ModelOutput(model, tmp_path / "particles", particle_fields=["state"]) as output:
+        output.write()
+    with h5py.File(tmp_path / "particles/000000.h5") as file:
+        assert {name for name in file if name.startswith("state")} == set(names)
+        for name, column in zip(names, state.T, strict=True):
+            np.testing.assert_array_equal(file[name], column)
+
+
+def test_a_field_that_no_particle_has_yet_is_named(model):
+    p = model.particles
+    assert len(p.velocity_gradient) == 0 < len(p)
+    for show in (p.to_dataframe, p.to_meshio, lambda name: p.plot(f"{name}_xx")):
+        with pytest.raises(mpm.InputError, match="'velocity_gradient', but no particle carries one"):
+            show("velocity_gradient")
+
+
 def test_a_picture_has_a_circle_for_each_particle_coloured_by_the_field(model):
     p = model.particles
     axes = p.plot("displacement")
