@@ -71,6 +71,25 @@ double pressure_sum(const Particles<D>& particles, const Run& run)
   return base::sum(sum);
 }
 
+/// sum V w^2
+template <int D>
+double squared_velocity_sum(const Particles<D>& particles, const Run& run)
+{
+  std::array<const double*, D + 1> columns{particles.volume.data()};
+  for (int a = 0; a < D; ++a)
+    columns[a + 1] = particles.water_velocity[a].data();
+  Lanes sum{};
+  add_lanes(columns, run.first, run.last,
+            [&sum](const Piece<D + 1>& piece, const LaneMask& mine)
+            {
+              Lanes squared{};
+              for (int a = 0; a < D; ++a)
+                squared += piece[a + 1] * piece[a + 1];
+              sum += mine ? piece[0] * squared : Lanes{};
+            });
+  return base::sum(sum);
+}
+
 /// @returns whether all pores are open
 template <int D>
 bool change_water(Particles<D>& particles, const PoreWater& water, const Run& run, const Vector<D>& centre,
@@ -164,6 +183,7 @@ std::array<double, 2> water_pass(Model<G>& model, double dt, double flip_fractio
           [&](Index p, int a) { return particles.water_velocity[a][p] + change.exchange[a]; });
     if (!change_water<D>(particles, *model.water, run, model.mesh.shapes[run.cell].centre, flip_fraction, change))
       note_closed_pores(model, run);
+    model.energy.outflow_kinetic += 0.5 * change.outflow * squared_velocity_sum(particles, run);
     work[1] -= half_strain * (1 + change.growth) * pressure_sum(particles, run); // volumes grow later in the step
   };
   std::ranges::for_each(model.order.runs, change_run);
