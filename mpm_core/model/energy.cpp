@@ -132,12 +132,18 @@ void start_energy_balance(Model<G, D>& model)
   book.ahead = 0;
   book.kinetic_start = energy.kinetic;
   book.balance_start = energy_balance(model, energy.kinetic);
-  book.plastic_start = book.stress_work - energy.stored - book.outflow_stored;
   book.external_start = model.totals.external_work + model.totals.support_work;
   book.stress_start = book.stress_work;
   book.pic_start = book.pic_loss;
   book.largest_work = 0;
   book.stale = false;
+}
+
+template <class G, int D>
+void start_plastic_work(Model<G, D>& model)
+{
+  EnergyBook& book = model.energy;
+  book.plastic_start = book.stress_work - particle_energy(model).stored - book.outflow_stored;
 }
 
 #define INSTANTIATE(G)                                                                                                 \
@@ -147,7 +153,8 @@ void start_energy_balance(Model<G, D>& model)
   template double energy_balance(const Model<G>&, double);                                                             \
   template std::array<double, 2> works_so_far(const Model<G>&);                                                        \
   template void note_largest_work(Model<G>&);                                                                          \
-  template void start_energy_balance(Model<G>&);
+  template void start_energy_balance(Model<G>&);                                                                       \
+  template void start_plastic_work(Model<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

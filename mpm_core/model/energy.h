@@ -26,7 +26,7 @@ struct EnergyBook
   double outflow_stored = 0;
   double balance_start = 0;  ///< see `energy_balance`, when the particles were last changed by anything but a step
   double kinetic_start = 0;  ///< likewise
-  double plastic_start = 0;  ///< likewise, stress_work less stored energy
+  double plastic_start = 0;  ///< stress_work less stored energy, when they were last changed by anything but a step
   double external_start = 0; ///< likewise, external and support work
   double stress_start = 0;   ///< likewise, stress_work
   double pic_start = 0;      ///< likewise, pic_loss
@@ -71,4 +71,8 @@ void note_largest_work(Model<G, D>& model);
 /// Resets the balance to the present particles.
 template <class G, int D>
 void start_energy_balance(Model<G, D>& model);
+
+/// Counts plastic work from the present particles on, whose stresses have not done any.
+template <class G, int D>
+void start_plastic_work(Model<G, D>& model);
 } // namespace mpm::model

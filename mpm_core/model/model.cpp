@@ -250,7 +250,10 @@ void prepare(Model<G>& model)
   if (has_affine_gradients(model.particles))
     model.energy.kinetic = affine_kinetic_energy(model);
   if (model.energy.stale)
+  {
     start_energy_balance(model);
+    start_plastic_work(model);
+  }
 }
 
 template <class G>
