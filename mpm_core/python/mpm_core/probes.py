@@ -15,15 +15,16 @@ Example:
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
-from ._core import InputError
+from ._core import Geometry, InputError
 from .collective import collectively
-from .components import AXES, SYMMETRIC
+from .components import AXES, SYMMETRIC, tensor_components
 from .mesh import Mesh, floats
 from .model import Model
 from .row_file import RowFile
@@ -40,12 +41,18 @@ class Probe(Protocol):
         """Numbers by name of column, the same on all ranks; the first is ``time_s``. Collective."""
 
 
-def _components(name: str, unit: str, parts: tuple[str, ...]) -> list[str]:
+def _components(name: str, unit: str, parts: Sequence[str]) -> list[str]:
     return [f"{name}_{part}_{unit}" for part in parts]
 
 
 def _vectors(dim: int, *names: tuple[str, str]) -> list[str]:
     return [column for name, unit in names for column in _components(name, unit, AXES[dim])]
+
+
+def _stresses(model: Model) -> list[str]:
+    """Columns of the stress, whose third axis is the hoop in axial symmetry, as in files and tables."""
+    width, axisymmetric = len(SYMMETRIC[model.mesh.dim]), model.geometry == Geometry.AXISYMMETRIC
+    return _components("stress", "Pa", tensor_components("stress", width, axisymmetric) or ())
 
 
 def _numbered(rows: NDArray, columns: list[str]) -> dict[str, float]:
@@ -98,7 +105,7 @@ class ParticleProbe:
         """Numbers of the particles."""
         dim = model.mesh.dim
         self._columns = _vectors(dim, ("position", "m"), ("displacement", "m"), ("velocity", "m/s"))
-        self._columns += _components("stress", "Pa", SYMMETRIC[dim])
+        self._columns += _stresses(model)
 
     def __repr__(self) -> str:
         return f"<ParticleProbe: particles {', '.join(map(str, self.ids))}; {', '.join(self._columns)}>"
@@ -140,7 +147,7 @@ class PointProbe:
         self._columns = [
             "filled_fraction",
             *_vectors(dim, ("velocity", "m/s")),
-            *_components("stress", "Pa", SYMMETRIC[dim]),
+            *_stresses(model),
         ]
 
     def __repr__(self) -> str:
@@ -277,7 +284,7 @@ class TotalsProbe:
         momentum = dict(zip(_components("momentum", "N.s", AXES[dim]), report.momentum, strict=True))
         energies = (
             "kinetic_energy", "nodal_kinetic_energy", "external_work", "internal_work", "stress_work", "stored_energy",
-            "plastic_work", "damping_work", "support_work", "pic_loss", "unexplained_energy",
+            "plastic_work", "damping_work", "support_work", "drag_work", "friction_work", "pic_loss", "unexplained_energy",
         )  # fmt: skip
         return {
             "time_s": report.time, "steps": report.steps, "dt_s": report.dt, "particles": report.particles,
