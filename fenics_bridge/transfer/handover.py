@@ -12,6 +12,7 @@ from mpi4py import MPI
 from mpm_core.checks import flag, member, of_kind, renamed
 from mpm_core.collective import collectively
 from mpm_core.equilibrium import beyond_equilibrium
+from mpm_core.law_text import parameter_texts
 from numpy.typing import NDArray
 
 import mpm_core as mpm
@@ -363,15 +364,8 @@ def _law_mistake(material: Any, law: Any, there: Any) -> str | None:
     """Difference between the law of a material and that of the finite elements, in words; None for none."""
     if type(law) is not type(there):
         return f"the law of fem is {type(there).__name__}, that of material {material} is {type(law).__name__}"
-    for name in _parameters(law):
-        if getattr(law, name) != getattr(there, name):
-            return (
-                f"the law of fem has {name}={getattr(there, name)!r}, that of material {material} has "
-                f"{name}={getattr(law, name)!r}"
-            )
+    own, of_fem = parameter_texts(law), parameter_texts(there)
+    for name, text in own.items():
+        if text != of_fem[name]:
+            return f"the law of fem has {name}={of_fem[name]}, that of material {material} has {name}={text}"
     return None
-
-
-def _parameters(law: Any) -> Any:
-    """Names of a law's parameters: its numbers, and whatever else is no method."""
-    return [name for name in dir(law) if not name.startswith("_") and not callable(getattr(law, name))]

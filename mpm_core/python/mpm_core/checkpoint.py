@@ -22,7 +22,8 @@ from .contact import OF_SURFACES, set_contacts
 from .description import parsed
 from .far_field import require_border
 from .field_contact import set_field_contacts
-from .fingerprint import fingerprint, mesh_fingerprint
+from .fingerprint import mesh_fingerprint
+from .law_text import law_text
 from .rows import find_items
 from .step_control import StepControl
 from .surface_description import require_surfaces
@@ -355,7 +356,7 @@ def _description(model: Model) -> dict[str, Any]:
         "geometry": model.geometry.name,
         "velocity_fields": model._velocity_fields,
         "mesh": f"fingerprint {mesh_fingerprint(model.mesh):016x}",
-        "materials": [_material(law) for law in model.laws],
+        "materials": [law_text(law) for law in model.laws],
         "gravity": list(core.gravity),
         "gravity_ramp": core.gravity_ramp,
         "outflow_tags": list(core.outflow_tags),
@@ -382,28 +383,6 @@ def _added_fields(model: Model) -> list[dict[str, Any]]:
     own = {field["name"] for field in type(model._core).default_particle_schedule()}
     keys = ("name", "unit", "meaning", "components", "initial")
     return [{key: field[key] for key in keys} for field in model.particles.schedule() if field["name"] not in own]
-
-
-_NOT_COMPARED = ("needs_cell_size", "strength_parameters", "library", "symbol")
-"""Properties on which no step depends beside the others"""
-
-
-def _material(law: Any) -> str:
-    """Text with the name and all parameters of a law and the laws within it, which differs between any two laws."""
-    names = sorted(
-        name for name, value in vars(type(law)).items() if isinstance(value, property) and name not in _NOT_COMPARED
-    )
-    values = [getattr(law, name) for name in names]
-    texts = [_value(law, value) for value in values]
-    return f"{type(law).__name__}({', '.join(f'{name}={text}' for name, text in zip(names, texts, strict=True))})"
-
-
-def _value(law: Any, value: Any) -> str:
-    """A parameter of a law as text."""
-    if isinstance(value, tuple(_core.law_types)):
-        return _material(value)
-    is_python = isinstance(law, _core.PythonLaw) and value is law.law
-    return fingerprint(value) if is_python else repr(value)
 
 
 def _take(model: Model, there: dict[str, Any]) -> None:

@@ -241,6 +241,42 @@ def test_laws_that_do_not_match_are_named(law, words):
         bridge.initialise(slope_particles(UNIT_WEIGHT, law=law), solved())
 
 
+class Loam:
+    """The Mohr-Coulomb law, called from Python, with an array among its attributes."""
+
+    n_state = 2
+    p_wave_modulus = mpm.LinearElastic(young=YOUNG, poisson=POISSON).p_wave_modulus
+    strength_parameters = {"c": "strength", "phi": "friction angle"}
+
+    def __init__(self, c, exponents=(1.0, 0.0)):
+        self.c, self.phi, self.exponents = c, 25.0, np.array(exponents)
+
+    def update(self, *points):
+        strength = {"cohesion": self.c * self.exponents[0], "friction_angle": self.phi}
+        mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, **strength).update(*points)
+
+
+def test_laws_in_python_match_by_their_code_and_values():
+    """Not as objects: a factor of safety makes new ones each time."""
+
+    def reduced(*values):
+        return bridge.reduced_strength(mpm.PythonLaw(Loam(*values)), 1.05)
+
+    body, _, facets = bridge.soil_mesh(*bridge.slope_mesh(MPI.COMM_WORLD, cell_size=0.2))
+    held = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
+    fem_model = bridge.QuasiStatic(body, reduced(1.2e3), facets, held, degree=1)
+    fem_model.solve(bridge.Load(unit_weight=UNIT_WEIGHT))
+    assert fem_model.converged
+    model = slope_particles(UNIT_WEIGHT, cell_size=0.2, law=reduced(1.2e3))
+    assert bridge.initialise(model, fem_model).unbalanced_ratio < 1e-8
+    for values, words in (
+        ((1.26e3,), r"has law=Loam\(c=1142.8.*has law=Loam\(c=1200.0"),
+        ((1.2e3, (1.0, 0.1)), "has law=Loam"),
+    ):
+        with pytest.raises(mpm.InputError, match=words):
+            bridge.initialise(slope_particles(UNIT_WEIGHT, cell_size=0.2, law=reduced(*values)), fem_model)
+
+
 @pytest.mark.parametrize(
     ("weight", "said"), [(UNIT_WEIGHT, False), (0.5 * UNIT_WEIGHT, True), (1.1 * UNIT_WEIGHT, True)]
 )

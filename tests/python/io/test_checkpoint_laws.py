@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from core_cases import box
-from mpm_core.checkpoint import _material
 from mpm_core.fingerprint import fingerprint
+from mpm_core.law_text import law_text
 
 import mpm_core as mpm
 
@@ -133,7 +133,7 @@ def test_a_law_is_described_as_in_older_checkpoints():
     # As version 0.1.0 wrote it before laws declared what they need, with the separation, which is new; recorded, for old files
     # cannot be written any more.
     law = mpm.MohrCoulomb(young=2e5, poisson=0.3, cohesion=500.0, friction_angle=25.0, dilation_angle=5.0)
-    assert _material(law) == (
+    assert law_text(law) == (
         "MohrCoulomb(cohesion=500.0, dilation_angle=5.0, friction_angle=25.0, n_state=2, name='MohrCoulomb', "
         "p_wave_modulus=269230.76923076925, poisson=0.3, shear_modulus=76923.07692307692, state_names=['plastic_strain', "
         "'separation'], tension_cutoff=inf, young=200000.0)"
