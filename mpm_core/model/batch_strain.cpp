@@ -1,6 +1,7 @@
 #include "model/batch_strain.h"
 
 #include "model/integration.h"
+#include "model/law_increment.h"
 #include "model/mapping.h"
 #include "transfer/affine_field.h"
 
@@ -136,6 +137,8 @@ void strain_dual_domains(const Mesh<D>& mesh, const VelocityField<G>& field, con
         set_volumetric<G>(strain, averaged_strain<G>(mesh, field, run.cell, strain.volumetric));
       for (int k = 0; k < n_stress<D>; ++k)
         scratch.strain[k][p - batch.first] = strain.increment[k];
+      scratch.deformation[p - batch.first] =
+          deformation_of<D>(scaled<D>({{}, gradient}, options.dt).gradient, strain.volumetric);
       strain_particles<D>(particles, p, p + 1, strain);
     }
   }

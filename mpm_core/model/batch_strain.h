@@ -19,6 +19,8 @@ struct BatchScratch
   std::array<CellStrain<D, Lanes>, batch_size / lanes> cells; ///< per run, `lanes` of them together
   /// Per particle, one column per component; that out of plane stays zero
   alignas(64) double strain[n_stress<D>][batch_size + lanes];
+  /// Per particle, where those of a cell differ (dual domains): increment of the deformation gradient
+  std::array<Matrix<D>, batch_size> deformation;
   /// Per run, one column per component: sum V_p sigma_p of its particles before and after the strain
   alignas(64) double stress_before[n_stress<D>][batch_size], stress_after[n_stress<D>][batch_size];
 

@@ -72,7 +72,7 @@ struct StrainPerCell
   }
 };
 
-/// Dual domains: each particle has its own strain and its own work, and no deformation gradient is known of it.
+/// Dual domains: each particle has its own strain and its own work.
 struct StrainPerParticle
 {
   static constexpr bool moves_moments = false;
@@ -85,8 +85,10 @@ struct StrainPerParticle
   }
 
   template <int D>
-  static void deform(const MaterialPoints<D>&, const Batch&, const BatchScratch<D>&, LawIncrement<D>&, PointBatch<D>&)
+  static void deform(const MaterialPoints<D>& material, const Batch& batch, const BatchScratch<D>& scratch,
+                     LawIncrement<D>& columns, PointBatch<D>& points)
   {
+    give_deformation<D>(material, batch, std::span(std::as_const(scratch.deformation)), columns, points);
   }
 
   template <class G, int D = G::dim>

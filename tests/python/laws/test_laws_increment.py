@@ -94,7 +94,7 @@ void umat_(double* stress, double* statev, double* ddsdde, double* sse, double* 
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("scheme", ["explicit", "implicit"])
+@pytest.mark.parametrize("scheme", ["explicit", "dual domains", "implicit"])
 def test_tensors_of_a_umat_turn_with_the_material(tmp_path, scheme, dim):
     """Those in STATEV by DROT as the stress, which this law leaves as it is; and STRAN, before each increment adds to it."""
     (tmp_path / "umat.c").write_text(ROTATING)
@@ -108,8 +108,9 @@ def test_tensors_of_a_umat_turn_with_the_material(tmp_path, scheme, dim):
     state[:, first : first + len(components)] = stress[:, components]
     model.particles.set("stress", stress)
     model.particles.set("state", state)
-    if scheme == "explicit":
-        run(model, steps * dt, dt=dt, allow_unstable=True, energy_limit=None)
+    if scheme != "implicit":
+        integration = mpm.Integration.DUAL_DOMAIN if scheme == "dual domains" else mpm.Integration.PARTICLES
+        run(model, steps * dt, dt=dt, allow_unstable=True, energy_limit=None, integration=integration)
     else:
         list(model.implicit(steps * dt, dt=dt, quasi_static=True))
     p = model.particles
@@ -148,10 +149,11 @@ def moving_box(law, dim):
 
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("nmd", [False, True])  # the volumetric strain is uniform, so that its mean changes nothing
-def test_explicit_particles(law, dim, nmd):
+@pytest.mark.parametrize("integration", mpm.Integration.__members__.values())
+def test_explicit_particles(law, dim, nmd, integration):
     # In each step F grows by 1 + dt grad v with grad v = (v_top / h) e_y, since the mesh is put back after it
     model, steps, dt = moving_box(law, dim), 10, 0.01
-    run(model, steps * dt, dt=dt, allow_unstable=True, nmd=nmd)
+    run(model, steps * dt, dt=dt, allow_unstable=True, nmd=nmd, integration=integration)
     step = np.eye(3)
     axes = np.arange(dim)
     step[axes, dim - 1] += dt * np.array([0.02] * (dim - 1) + [-0.03]) / 0.5
