@@ -81,8 +81,8 @@ class ParticleSite:
             Report of the stage.
 
         Raises:
-            InputError: the stage has an unknown soil or boundary, a law that the model was not made with, or a load on resting
-                cells; nothing has been changed. Raised on all ranks alike.
+            InputError: the stage has an unknown soil or boundary, a law that the model was not made with, a load on resting
+                cells, or a layer in cells that other soil has moved into; nothing has been changed. Raised on all ranks alike.
             StageError: there is no equilibrium; the particles are then in the last equilibrium of the stage.
         """
         model = self.model
@@ -99,6 +99,7 @@ class ParticleSite:
         )
         agree(model.comm, problem)
         self._refuse_resting(state, stage)
+        self._refuse_occupied(fill, stage)
         if stage.reset_displacement:
             model.particles.set("initial_position", model.particles.position)
         model.remove(np.isin(model.mesh.cell_tags[model.particles.cell], excavate))
@@ -201,6 +202,18 @@ class ParticleSite:
             message = (
                 f"stage {stage.name!r}: {name} would load {count} resting cells, expected particles to carry it: turn the cells "
                 "there into particles first, by Model.convert"
+            )
+            agree(model.comm, message if count else None)
+
+    def _refuse_occupied(self, fill: Sequence[int], stage: Stage) -> None:
+        """Raise InputError, on all ranks, where other soil has moved into the cells of a layer that is placed. Collective."""
+        model = self.model
+        occupied = model.mesh.cell_tags[np.unique(model.particles.cell)]
+        for tag in fill:
+            count = model.comm.allreduce(int(np.count_nonzero(occupied == tag)))
+            message = (
+                f"stage {stage.name!r}: fill: other soil has moved into {count} cells of the soil {self.state._name_of(tag)}, expected "
+                "empty cells: remove its particles there first, by Model.remove, or take small_displacements=True"
             )
             agree(model.comm, message if count else None)
 

@@ -204,3 +204,22 @@ def test_loads_on_resting_cells_are_refused_until_they_are_particles(tmp_path, l
         p = site.model.particles
         stresses.append(p.stress[np.lexsort(p.position.T)])
     assert np.allclose(*stresses, rtol=0, atol=1e-6 * np.abs(stresses[0]).max())
+
+
+def test_a_layer_in_cells_that_other_soil_has_moved_into_is_refused(tmp_path):
+    """Such as ground that heaved below a cut; nothing of the stage is done then."""
+    soils = SOILS["column"]
+    site = particle_site(mesh_of("column", tmp_path), elastic(soils))
+    p = site.model.particles
+    site.carry_out(bridge.Stage("in situ", fill=["ground"], unit_weight=weights(["ground"])))
+    heaved = p.position.copy()
+    heaved[np.argmax(heaved[:, 1]), 1] = 3.1
+    site.model.place(heaved)
+    place, displacement = p.position, p.displacement
+    layer = bridge.Stage("layer", fill=["layer 2", "layer 1"], unit_weight=weights(soils), reset_displacement=True)
+    with pytest.raises(bridge.InputError, match="stage 'layer': fill: .* moved into 1 cells of the soil 'layer 1'"):
+        site.carry_out(layer)
+    assert np.array_equal(p.position, place) and np.array_equal(p.displacement, displacement) and site.number == 1
+    site.model.remove(p.position[:, 1] > 3.0)
+    site.carry_out(layer)
+    assert len(site.rows_of("layer 1").nonzero()[0]) > 0
