@@ -86,7 +86,7 @@ class RowsFile:
                 continue
             # As create_dataset does it, in a fifth of the time, which counts in frames of many small fields.
             kind, space = h5py.h5t.py_create(values.dtype), h5py.h5s.create_simple(values.shape)
-            dataset = h5py.h5d.create(self._file, name.encode(), kind, space, self._creation)
+            dataset = h5py.h5d.create(self._file, name.encode(), kind, space, self._creation, self._into_groups)
             dataset.write(h5py.h5s.ALL, h5py.h5s.ALL, values)
         if self._links and self._file is not None:
             group = h5py.h5g.open(self._file, b"/")
@@ -111,6 +111,8 @@ class RowsFile:
         self._file = h5py.h5f.create(self._path.encode(), h5py.h5f.ACC_TRUNC, fapl=access)
         self._creation = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
         self._creation.set_obj_track_times(False)  # the same frame makes the same file, whenever it is written
+        self._into_groups = h5py.h5p.create(h5py.h5p.LINK_CREATE)
+        self._into_groups.set_create_intermediate_group(True)
 
     def close(self, durable: bool = False) -> None:
         """Write what is gathered and close the file; on the rank that writes, others do nothing.

@@ -109,3 +109,26 @@ def test_a_folder_without_permission_is_named(tmp_path):
         pytest.skip("this user may write everywhere")
     with pytest.raises(mpm.RunError, match="cannot write .*Permission denied"):
         column().save(tmp_path / "state.h5")
+
+
+@pytest.mark.parametrize("before", [0, 96])
+def test_a_model_without_particles_is_saved_and_goes_on(tmp_path, before):
+    """Before it is seeded, or after its soil has been removed: new particles are those of the model that was saved."""
+
+    def ground():
+        model = mpm.Model(box((4, 4)), mpm.LinearElastic(young=1e6, poisson=0.3))
+        model.fix(3)
+        return model
+
+    model, again = ground(), ground()
+    model.set_gravity((0.0, -9.81))
+    if before:
+        assert model.seed(density=2000.0, per_cell=3) == before
+        model.remove(np.ones(before, dtype=bool))
+    model.save(tmp_path / "state.h5")
+    again.restore(tmp_path / "state.h5")
+    for one in (model, again):
+        one.seed(density=2000.0, per_cell=3)
+        one.explicit(0.01).last()
+    assert model.particles.id.min() == again.particles.id.min() == before
+    assert np.array_equal(by_id(model, "stress"), by_id(again, "stress")) and np.abs(model.particles.stress).max() > 0
