@@ -189,15 +189,15 @@ def cell_dofs(space: Any) -> NDArray[np.int32]:
     dofs = space.dofmap.list
     if isinstance(dofs, np.ndarray):
         return dofs
-    n_cells = dofs.num_nodes
-    return dofs.array.reshape(n_cells, -1) if n_cells else dofs.array.reshape(0, 1)
+    return dofs.array.reshape(dofs.num_nodes, space.dofmap.dof_layout.num_dofs)  # a rank may have no cells
 
 
 def expression_values(expression: Any, domain: mesh.Mesh, cells: ArrayLike) -> NDArray[np.float64]:
     """Values of a compiled expression in the given cells: (number of cells, points times components)."""
     cells = np.asarray(cells, dtype=np.int32)
     if "mesh" in inspect.signature(expression.eval).parameters:
-        return expression.eval(domain, cells).reshape(len(cells), -1)
+        values = expression.eval(domain, cells)
+        return values.reshape(len(cells), np.prod(values.shape[1:], dtype=int))
     return expression.eval(cells)
 
 

@@ -49,7 +49,7 @@ class AveragedStrain:
         """Volumes of the cells (n,)"""
         self.of_strains, self.of_forces = np.ones(n), np.ones(n)
         """Fraction by which a cell's strains, and its forces, are averaged, (n,)"""
-        rows, columns = _strain_rows(gradients, radii), np.repeat(dofs.reshape(n, -1), self.size, axis=0)
+        rows, columns = _strain_rows(gradients, radii), np.repeat(dofs.reshape(n, corners * dim), self.size, axis=0)
         self.plain = matrix(comm, (n * self.size, n_dofs), columns, rows)
         """The plain strain"""
         self.mean_of_nodes = matrix(comm, (n, n_nodes), nodes, 1 / corners)

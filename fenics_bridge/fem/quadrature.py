@@ -192,8 +192,9 @@ class QuadraturePoints:
 
     def coordinates(self) -> NDArray[np.float64]:
         """Positions of the points: (n, D) [m]."""
-        corners = self._domain.geometry.x[compat.cell_nodes(self._domain)[self.cells], : self._domain.geometry.dim]
-        return np.einsum("qk,ckd->cqd", self._linear_shapes(), corners).reshape(self.n, -1)
+        dim = self._domain.geometry.dim
+        corners = self._domain.geometry.x[compat.cell_nodes(self._domain)[self.cells], :dim]
+        return np.einsum("qk,ckd->cqd", self._linear_shapes(), corners).reshape(self.n, dim)
 
     def sum_over_cells(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weighted sums of values (n,) at the points of each cell, over the volume of the cell but for a factor: (m,)."""
@@ -211,7 +212,7 @@ class QuadraturePoints:
             degree: 0 for the mean by volume, constant in each cell; 1 for the linear function in each cell that is nearest to the
                 values at its points (least squares, by the weights of the points).
         """
-        values = values.reshape(len(self.cells), self.per_cell, -1)
+        values = values.reshape(len(self.cells), self.per_cell, 1 if values.ndim == 1 else values.shape[1])
         if degree == 0:
             weights = (
                 np.broadcast_to(self._weights, values.shape[:2]) if self._radii is None else self._weights * self._radii

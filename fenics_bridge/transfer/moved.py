@@ -56,7 +56,8 @@ def held_volumes(domain: Mesh, displacement: fem.Function, geometry: Geometry | 
     per_cell = max(1, round(_SAMPLES * _mean(body.comm, own) / _mean(domain.comm, cell_volumes(domain))))
     samples = simplex_samples(body.geometry.dim, per_cell)
     at = np.zeros((len(own) * len(samples), 3))
-    at[:, : body.geometry.dim] = np.einsum("qk,ckd->cqd", samples, _ordered(cell_corners(body))).reshape(len(at), -1)
+    places = np.einsum("qk,ckd->cqd", samples, _ordered(cell_corners(body)))
+    at[:, : body.geometry.dim] = places.reshape(len(at), body.geometry.dim)
     cells = np.repeat(np.arange(len(own), dtype=np.int32), len(samples))
     moved, sampled = at[:, : body.geometry.dim], np.repeat(own / len(samples), len(samples))
     if len(at):

@@ -63,7 +63,7 @@ class PressureProjection:
             own = own[own < n]
             storage[own], density[own] = soil.porosity / water.modulus, soil.density or 0.0
             mobility[own] = np.linalg.eigvalsh(soil.tensor(soil.conductivity, dim)).min() / water.unit_weight
-        self._moments = MARGIN * (dim + 1) * (_slenderness(corners, longest)[:, None] * moments.reshape(n, -1))
+        self._moments = MARGIN * (dim + 1) * (_slenderness(corners, longest)[:, None] * moments.reshape(n, dim * dim))
         self._storage, self._per_second = storage, 6 * mobility / longest
         self._mass = density * longest / (12 * dim)
 

@@ -301,9 +301,10 @@ class Seepage:
         space = compat.function_space(self.domain, "DG", self._degree - 1, dim)
         result = fem.Function(space, name="velocity")
         velocities, dofs = result.x.array.reshape(-1, dim), compat.cell_dofs(space)
-        head = fem.Expression(ufl.as_vector([psi, *(ufl.grad(psi) + self._up)]), compat.interpolation_points(space))
+        places = compat.interpolation_points(space)
+        head = fem.Expression(ufl.as_vector([psi, *(ufl.grad(psi) + self._up)]), places)
         for soil, own in zip(self._soils, self._cells):
-            there = compat.expression_values(head, self.domain, own).reshape(len(own), -1, 1 + dim)
+            there = compat.expression_values(head, self.domain, own).reshape(len(own), len(places), 1 + dim)
             permeability = soil.retention.relative_permeability(-self.unit_weight * there[..., :1])
             velocities[dofs[own]] = -permeability * (there[..., 1:] @ soil.tensor(soil.conductivity, dim).T)
         return result

@@ -273,3 +273,17 @@ def test_averaged_elements_hand_over_in_equilibrium_for_averaged_steps(geometry)
     model.explicit(0.01, nmd=True).last()
     moved = COMM.allreduce(float(np.abs(model.particles.displacement).max(initial=0.0)), MPI.MAX)
     assert moved < 1e-6 * settlement
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_averaged_elements_on_ranks_without_cells(dim):
+    """Of two triangles a third rank has none; six tetrahedra are for comparison."""
+    points, moved = np.array([[0.5] * dim, [0.9] * dim]), []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        domain, _, facet_tags = bridge.box_mesh(comm, [1.0] * dim, [1] * dim)
+        supports = [bridge.roller(1, tuple(np.eye(dim)[0])), bridge.fixed(2 * dim - 1)]
+        law = mpm.MohrCoulomb(young=2e6, poisson=0.3, cohesion=9e3, friction_angle=20.0)
+        fem = bridge.QuasiStatic(domain, law, facet_tags, supports, degree=1, nmd=True)
+        fem.solve(bridge.Load(unit_weight=18e3))
+        moved.append(fem.evaluate_at(points)["displacement"])
+    assert np.allclose(moved[0], moved[1], rtol=0, atol=1e-9 * np.abs(moved[0]).max()) and np.abs(moved[0]).max() > 0

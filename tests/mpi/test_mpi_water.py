@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from dolfinx import mesh
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -91,3 +92,17 @@ def test_prescribed_pressures_are_handed_over_alike_on_any_number_of_ranks(wet):
         ]
         results.append(comm.allreduce(np.array(sums)))
     assert results[1] == pytest.approx(results[0], rel=1e-6)
+
+
+def test_flow_through_a_soil_that_not_all_ranks_have():
+    """Two soils in series: q = dh / (l_1 / k_1 + l_2 / k_2), everywhere along the axis."""
+    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (8.0, 1.0), (16, 2))
+    cells = domain.topology.index_map(2)
+    count = cells.size_local + cells.num_ghosts
+    first = mesh.compute_midpoints(domain, 2, np.arange(count, dtype=np.int32))[:, 0] < 0.5
+    tags = mesh.meshtags(domain, 2, np.arange(count, dtype=np.int32), np.where(first, 1, 2).astype(np.int32))
+    soils = {1: water.PorousSoil(1e-6), 2: water.PorousSoil(1e-5)}
+    flow = water.Seepage(domain, soils, facet_tags, [water.Head(1, 2.0), water.Head(2, 1.0)], cell_tags=tags)
+    flow.solve()
+    velocity = bridge.evaluate_at(np.array([[0.2, 0.4], [0.45, 0.9], [3.3, 0.7], [7.9, 0.1]]), v=flow.velocity())["v"]
+    assert velocity == pytest.approx(np.tile([1.0 / (0.5 / 1e-6 + 7.5 / 1e-5), 0.0], (4, 1)), rel=1e-9, abs=1e-16)
