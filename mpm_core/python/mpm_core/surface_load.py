@@ -175,10 +175,12 @@ class Soil:
 
 
 def samples(surface: Surface, lower: Floats, upper: Floats, spacing: float) -> Samples:
-    """Points evenly on a surface, not farther apart than a spacing."""
+    """Points evenly on the part of a surface within a box, not farther apart than a spacing; none where it lies outside."""
     points, cells = outline(surface, lower, upper)
     corners = points[cells].astype(float)
     dim = points.shape[1]
+    if len(cells) == 0:
+        return np.empty((0, dim)), np.empty(0), np.empty((0, dim))
     longest = np.max(
         [np.linalg.norm(corners[:, a] - corners[:, b], axis=1) for a, b in product(range(dim), repeat=2)], axis=0
     )

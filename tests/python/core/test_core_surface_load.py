@@ -36,6 +36,8 @@ def test_loads_need_soil_and_one_kind():
         loaded(mpm.Plane((0, 0.75), (0, -1)), pressure=1.0, traction=(0, 0))
     with pytest.raises(mpm.InputError, match="no soil beside it"):
         loaded(mpm.Plane((0, 0.95), (0, -1)), pressure=1.0)
+    with pytest.raises(mpm.InputError, match="no soil beside it"):  # nor within the mesh
+        loaded(mpm.Plane((0, 2.0), (0, -1)), pressure=1.0)
 
 
 def resultant(model, at):
