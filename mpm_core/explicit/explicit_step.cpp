@@ -7,6 +7,7 @@
 #include "model/absorbing.h"
 #include "model/contacts.h"
 #include "model/far_field.h"
+#include "model/field_contact_work.h"
 #include "model/field_contacts.h"
 #include "model/integration.h"
 #include "model/mapping.h"
@@ -139,8 +140,11 @@ void update_stress_first(Model<G>& model, const ExplicitOptions& options, double
   {
     find_start_velocity(field);
     field.velocity = field.start_velocity;
-    find_means(model, options, dt, field);
   }
+  separate_fields(model, dt); // by the contacts of the step before
+  note_late_work(model, dt);
+  for (VelocityField<G>& field : model.fields)
+    find_means(model, options, dt, field);
   clock.begin(Phase::particles);
   particle_pass(model, {dt, false, true, 0, options.nmd, dt});
   clock.begin(Phase::node_sums);
@@ -158,7 +162,7 @@ void update_stress_first(Model<G>& model, const ExplicitOptions& options, double
     work_at_end += add_work(field, model.exchange.owned, gravity, options.damping, dt, model.totals);
     note_rayleigh_work(model.exchange.owned, dt, field, model.totals);
   }
-  note_field_contact_work(model, dt);
+  note_field_contact_work(model, dt, true);
   model.energy.ahead = -0.5 * work_at_end; // the stresses are half a step behind the velocities, not ahead
   update_particles(model, options, dt, false, clock);
 }

@@ -16,6 +16,9 @@ struct ContactNode
   Vector<D> normal; ///< unit, from the first body to the second
   double gap;       ///< between the particles of the two; at least zero [m]
   Vector<D> force;  ///< on the second body [N]; the opposite acts on the first
+  bool sticks;      ///< whether friction and adhesion stop all slip
+  Vector<D>
+      shift; ///< of the second body in this step beside its motion, times its mass [kg m]; the opposite of the first
 };
 
 /// How far the particles of two bodies reach along the normal, the second ones against it, seen from a node [m].

@@ -1,5 +1,7 @@
 #include "model/field_contacts.h"
 
+#include "model/contact_pair.h"
+#include "model/field_contact_work.h"
 #include "model/mapping.h"
 
 #include <algorithm>
@@ -10,36 +12,6 @@ namespace mpm::model
 {
 namespace
 {
-template <class M>
-auto& field_at(M& model, Index number)
-{
-  return model.fields[static_cast<std::size_t>(number)];
-}
-
-/// The boundary condition of a node, or null.
-template <class G, int D = G::dim>
-const Support<D>* support_of(const VelocityField<G>& field, Index node)
-{
-  const auto found = std::ranges::lower_bound(field.supports, node, {}, &Support<D>::node);
-  return found != field.supports.end() && found->node == node ? &*found : nullptr;
-}
-
-/// What a unit impulse along `direction` changes the velocity of a node by: P direction / m.
-template <class G>
-Vector<G::dim> mobility(const VelocityField<G>& field, Index node, Vector<G::dim> direction)
-{
-  constexpr int D = G::dim;
-  if (const Support<D>* support = support_of(field, node))
-  {
-    Support<D> held = *support;
-    held.value.fill(0);
-    impose<D>(held, direction);
-  }
-  for (double& component : direction)
-    component /= field.nodes[node].mass;
-  return direction;
-}
-
 /// The velocity of a node at the step's end under the forces known so far, without local damping.
 template <class G>
 Vector<G::dim> trial_velocity(const VelocityField<G>& field, Index node, const Vector<G::dim>& gravity, double dt)
@@ -54,46 +26,12 @@ Vector<G::dim> trial_velocity(const VelocityField<G>& field, Index node, const V
   return velocity;
 }
 
-/// Two bodies at a node.
-template <class G, int D = G::dim>
-struct Pair
-{
-  const VelocityField<G>& first;
-  const VelocityField<G>& second;
-  Index node;
-
-  /// By how much a unit impulse between the bodies along `direction` changes their relative velocity along `along`.
-  double mobility(const Vector<D>& direction, const Vector<D>& along) const
-  {
-    return dot<D>(along, model::mobility(first, node, direction)) +
-           dot<D>(along, model::mobility(second, node, direction));
-  }
-};
-
-template <int D>
-Vector<D> difference(const Vector<D>& a, const Vector<D>& b)
-{
-  Vector<D> result;
-  for (int i = 0; i < D; ++i)
-    result[i] = a[i] - b[i];
-  return result;
-}
-
-/// a + factor b
-template <int D>
-Vector<D> sum(const Vector<D>& a, double factor, const Vector<D>& b)
-{
-  Vector<D> result;
-  for (int i = 0; i < D; ++i)
-    result[i] = a[i] + factor * b[i];
-  return result;
-}
-
-/// The impulse on the second body that keeps them from approaching by more than the gap, with Coulomb friction.
+/// The impulse on the second body that keeps them from approaching by more than the gap, with Coulomb friction; finds
+/// whether they stick.
 /// @param relative  velocity of the first body less that of the second, at the step's end without contact
 /// @param bond      largest tangential impulse without a normal one, by adhesion [N s]
 template <class G>
-Vector<G::dim> impulse_of(const Pair<G>& pair, const FieldContact<G::dim>& contact, const ContactNode<G::dim>& at,
+Vector<G::dim> impulse_of(const Pair<G>& pair, const FieldContact<G::dim>& contact, ContactNode<G::dim>& at,
                           const Vector<G::dim>& relative, double bond, double dt)
 {
   constexpr int D = G::dim;
@@ -101,19 +39,24 @@ Vector<G::dim> impulse_of(const Pair<G>& pair, const FieldContact<G::dim>& conta
   double normal = approach > 0 && yielding > 0 ? approach / yielding : 0; // none where both are held along the normal
   const Vector<D> slip = sum<D>(relative, -dot<D>(relative, at.normal), at.normal);
   const double speed = norm<D>(slip);
-  if (!(speed > 0) || contact.friction * normal + bond == 0)
+  at.sticks = contact.friction * normal + bond > 0;
+  if (!(speed > 0) || !at.sticks)
     return sum<D>({}, normal, at.normal);
   const Vector<D> along = sum<D>({}, 1 / speed, slip);
   const double tangential = pair.mobility(along, along);
   if (normal == 0)
+  {
+    at.sticks = speed <= bond * tangential;
     return sum<D>({}, tangential > 0 ? std::min(bond, speed / tangential) : 0, along);
+  }
   // Impulses N along the normal and T along the slip act on both components of the velocity where a boundary condition
   // is inclined to the normal.
   const double across = pair.mobility(along, at.normal), determinant = yielding * tangential - across * across;
   double friction = determinant > 0 ? (yielding * speed - across * approach) / determinant : 0;
   if (determinant > 0)
     normal = (tangential * approach - across * speed) / determinant;
-  if (friction > contact.friction * normal + bond)
+  at.sticks = friction <= contact.friction * normal + bond;
+  if (!at.sticks)
   {
     normal = (approach - across * bond) / (yielding + contact.friction * across);
     friction = contact.friction * normal + bond;
@@ -121,6 +64,32 @@ Vector<G::dim> impulse_of(const Pair<G>& pair, const FieldContact<G::dim>& conta
   if (!(normal > 0))
     return {};
   return sum<D>(sum<D>({}, normal, at.normal), friction, along);
+}
+
+/// The impulse on the second body that gives the bodies a relative velocity which contact leaves them: none where they
+/// stick; along the normal they do not open, and do not approach beyond their gap. With the impulse of the step it does
+/// not pull.
+/// @param relative  velocity of the first body less that of the second
+template <class G>
+Vector<G::dim> separation_of(const Pair<G>& pair, const ContactNode<G::dim>& at, const Vector<G::dim>& relative,
+                             double dt)
+{
+  constexpr int D = G::dim;
+  Vector<D> impulse{};
+  const Vector<D> slip = sum<D>(relative, -dot<D>(relative, at.normal), at.normal);
+  const double speed = norm<D>(slip);
+  if (at.sticks && speed > 0)
+  {
+    const Vector<D> along = sum<D>({}, 1 / speed, slip);
+    const double tangential = pair.mobility(along, along);
+    impulse = sum<D>({}, tangential > 0 ? speed / tangential : 0, along);
+  }
+  const double yielding = pair.mobility(at.normal, at.normal);
+  if (!(yielding > 0))
+    return impulse;
+  const double approach = dot<D>(difference<D>(relative, pair.change(impulse)), at.normal);
+  const double wrong = approach - std::clamp(approach, 0.0, at.gap / dt);
+  return sum<D>(impulse, std::max(wrong / yielding, -dt * dot<D>(at.force, at.normal)), at.normal);
 }
 
 /// The largest tangential impulse of adhesion at a node; zero where the bodies do not touch.
@@ -259,7 +228,7 @@ void find_forces(Model<G>& model, const Vector<G::dim>& gravity, double dt, Fiel
   {
     const auto k = static_cast<std::size_t>(i);
     const Reaches& reach = scratch.reaches[k];
-    ContactNode<D> at{i, scratch.normals[k], std::max(0.0, -(reach.first + reach.second)), {}};
+    ContactNode<D> at{i, scratch.normals[k], std::max(0.0, -(reach.first + reach.second)), {}, false, {}};
     const Vector<D> relative =
         difference<D>(trial_velocity(first, i, gravity, dt), trial_velocity(second, i, gravity, dt));
     double bond = 0;
@@ -282,6 +251,7 @@ template <class G>
 void add_field_contact_forces(Model<G>& model, const Vector<G::dim>& gravity, double dt)
 {
   constexpr int D = G::dim;
+  note_shift_work(model);
   for (FieldContact<D>& contact : model.field_contacts)
   {
     find_forces(model, gravity, dt, contact);
@@ -303,44 +273,24 @@ template <class G>
 void separate_fields(Model<G>& model, double dt)
 {
   constexpr int D = G::dim;
-  for (const FieldContact<D>& contact : model.field_contacts)
-    for (const ContactNode<D>& at : contact.touching)
+  for (FieldContact<D>& contact : model.field_contacts)
+    for (ContactNode<D>& at : contact.touching)
     {
       VelocityField<G>&first = field_at(model, contact.first), &second = field_at(model, contact.second);
+      at.shift = {};
+      if (is_light(first, at.node) || is_light(second, at.node))
+        continue;
       Vector<D>&v1 = first.velocity[at.node], &v2 = second.velocity[at.node];
-      const double approach = dot<D>(difference<D>(v1, v2), at.normal) - at.gap / dt;
-      if (!(approach > 0))
-        continue;
-      const double impulse = approach / Pair<G>{first, second, at.node}.mobility(at.normal, at.normal);
-      v1 = sum<D>(v1, -impulse, mobility(first, at.node, at.normal));
-      v2 = sum<D>(v2, impulse, mobility(second, at.node, at.normal));
+      const Vector<D> impulse = separation_of(Pair<G>{first, second, at.node}, at, difference<D>(v1, v2), dt);
+      at.shift = sum<D>({}, dt, impulse);
+      v1 = sum<D>(v1, -1, mobility(first, at.node, impulse));
+      v2 = sum<D>(v2, 1, mobility(second, at.node, impulse));
     }
-}
-
-template <class G>
-void note_field_contact_work(Model<G>& model, double dt)
-{
-  constexpr int D = G::dim;
-  double work = 0;
-  for (const FieldContact<D>& contact : model.field_contacts)
-    for (const ContactNode<D>& at : contact.touching)
-    {
-      if (!model.exchange.owned[at.node])
-        continue;
-      const VelocityField<G>&first = field_at(model, contact.first), &second = field_at(model, contact.second);
-      for (int a = 0; a < D; ++a)
-        work += at.force[a] * 0.5 * dt *
-                (second.start_velocity[at.node][a] + second.velocity[at.node][a] - first.start_velocity[at.node][a] -
-                 first.velocity[at.node][a]);
-    }
-  model.totals.external_work -= work;
-  model.totals.friction_work -= work;
 }
 
 #define INSTANTIATE(G)                                                                                                 \
   template void add_field_contact_forces(Model<G>&, const Vector<G::dim>&, double);                                    \
-  template void separate_fields(Model<G>&, double);                                                                    \
-  template void note_field_contact_work(Model<G>&, double);
+  template void separate_fields(Model<G>&, double);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

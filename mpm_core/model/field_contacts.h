@@ -27,12 +27,14 @@ namespace mpm::model
 template <class G>
 void add_field_contact_forces(Model<G>& model, const Vector<G::dim>& gravity, double dt);
 
-/// Lets no two bodies in contact approach each other by the velocities that move their particles. Momentum is kept.
-/// @pre the field's `velocity` is that of all particles after the step
+/// Gives the velocities that move and strain particles what contact leaves the bodies: where a force presses them
+/// together they keep their gap, and where they stick they do not slide. Momentum is kept.
+///
+/// The second mapping (19) spreads a force at a node over its neighbours, so that the velocities after it close or open
+/// a contact that the accelerations have just balanced. To take away only what closes it is not enough: bodies then
+/// open while forces act between them, and close after that without any, which generates energy in each vibration.
+/// @pre the fields' `velocity` is that of their particles; the contact is that of the step's forces, or of those of the
+/// step before where stresses are updated first
 template <class G>
 void separate_fields(Model<G>& model, double dt);
-
-/// Takes the work of contacts between fields out of the external work; what friction takes is `friction_work`.
-template <class G>
-void note_field_contact_work(Model<G>& model, double dt);
 } // namespace mpm::model

@@ -1,6 +1,7 @@
 #include "model/state.h"
 
 #include "materials/laws/stored_energy.h"
+#include "model/field_contact_state.h"
 #include "model/mapping.h"
 #include "model/moving_cells.h"
 #include "model/resting_nodes.h"
@@ -213,6 +214,8 @@ std::vector<Table> cell_state(const Model<G>& model)
   }
   if (!model.moved_cells.initial_points.empty())
     tables.push_back(moved_corners(model));
+  for (std::size_t k = 0; k < model.field_contacts.size(); ++k)
+    tables.push_back(touching_table(model, k));
   return tables;
 }
 
@@ -226,6 +229,8 @@ std::vector<Table> empty_cell_state(const Model<G>& model)
     tables.push_back({numbered("traction_moments", k), moments_width<TractionMoments<D>> + 1, {}});
   }
   tables.push_back(no_moved_corners<D>());
+  for (std::size_t k = 0; k < model.field_contacts.size(); ++k)
+    tables.push_back(empty_touching_table<D>(k));
   return tables;
 }
 
@@ -252,6 +257,10 @@ void restore_same(Model<G>& model, Particles<D>&& particles, const std::vector<T
         take(model.migration, table, field.tractions);
     make_resting_cells(model.mesh, model.particles, field);
   }
+  for (std::size_t k = 0; k < model.field_contacts.size(); ++k)
+    for (const Table& table : cells)
+      if (table.name == empty_touching_table<D>(k).name)
+        take_touching(model, table, k);
   for (const Table& table : ranks)
     set_number(model, table, table.values.front());
   model.energy.stale = false;
