@@ -142,7 +142,7 @@ void update_stress_first(Model<G>& model, const ExplicitOptions& options, double
     field.velocity = field.start_velocity;
   }
   separate_fields(model, dt); // by the contacts of the step before
-  note_late_work(model, dt);
+  note_late_work(model);
   for (VelocityField<G>& field : model.fields)
     find_means(model, options, dt, field);
   clock.begin(Phase::particles);

@@ -47,6 +47,7 @@ struct FieldContact
   double adhesion;                      ///< shear strength without pressure [Pa]
   Surface<D> interface;                 ///< along which they touch; its normal points from the first body to the second
   std::vector<ContactNode<D>> touching; ///< of the last step, by rising node
+  double dt = 0;                        ///< of that step [s]
   Vector<D> force{};                    ///< on the second body in the last step; this rank's part [N]
   Vector<D> impulse{};                  ///< on the second body since the contact was declared; this rank's part [N s]
   ContactScratch<D> scratch;

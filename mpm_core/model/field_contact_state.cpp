@@ -47,6 +47,7 @@ void take_touching(Model<G, D>& model, const Table& table, std::size_t contact)
   FieldContact<D>& of_fields = model.field_contacts[contact];
   std::vector<ContactNode<D>>& touching = of_fields.touching;
   touching.clear();
+  of_fields.dt = model.last.dt;
   const auto width = static_cast<std::size_t>(table.width);
   for (std::size_t row = 0; row < table.values.size(); row += width)
   {

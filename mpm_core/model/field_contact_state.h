@@ -17,6 +17,7 @@ template <int D>
 Table empty_touching_table(std::size_t contact);
 
 /// Takes the nodes in contact from a table.
+/// @pre the model has its last time step
 template <class G, int D = G::dim>
 void take_touching(Model<G, D>& model, const Table& table, std::size_t contact);
 } // namespace mpm::model

@@ -43,13 +43,13 @@ void note_shift_work(Model<G>& model)
 }
 
 template <class G>
-void note_late_work(Model<G>& model, double dt)
+void note_late_work(Model<G>& model)
 {
   note_shift_work(model);
   for (const FieldContact<G::dim>& contact : model.field_contacts)
     for (const ContactNode<G::dim>& at : contact.touching)
       if (model.exchange.owned[at.node])
-        model.totals.friction_work += 0.5 * dt * dot<G::dim>(at.force, start_velocities(model, contact, at));
+        model.totals.friction_work += 0.5 * contact.dt * dot<G::dim>(at.force, start_velocities(model, contact, at));
 }
 
 template <class G>
@@ -81,7 +81,7 @@ void note_field_contact_work(Model<G>& model, double dt, bool late)
 
 #define INSTANTIATE(G)                                                                                                 \
   template void note_shift_work(Model<G>&);                                                                            \
-  template void note_late_work(Model<G>&, double);                                                                     \
+  template void note_late_work(Model<G>&);                                                                             \
   template void note_field_contact_work(Model<G>&, double, bool);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

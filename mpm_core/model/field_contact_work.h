@@ -27,7 +27,7 @@ void note_shift_work(Model<G>& model);
 /// The same for the forces of the step before, on the velocities that they have given: where stresses are updated
 /// first, the nodes do not have these velocities in that step itself.
 template <class G>
-void note_late_work(Model<G>& model, double dt);
+void note_late_work(Model<G>& model);
 
 /// Takes the work of contacts between fields out of the external work; what they dissipate is `friction_work`.
 /// @param late  the work of the forces on the velocities that they give is left to `note_late_work`

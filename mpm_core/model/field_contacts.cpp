@@ -70,9 +70,10 @@ Vector<G::dim> impulse_of(const Pair<G>& pair, const FieldContact<G::dim>& conta
 /// stick; along the normal they do not open, and do not approach beyond their gap. With the impulse of the step it does
 /// not pull.
 /// @param relative  velocity of the first body less that of the second
+/// @param pressing  impulse of the step along the normal [N s]
 template <class G>
 Vector<G::dim> separation_of(const Pair<G>& pair, const ContactNode<G::dim>& at, const Vector<G::dim>& relative,
-                             double dt)
+                             double pressing, double dt)
 {
   constexpr int D = G::dim;
   Vector<D> impulse{};
@@ -89,7 +90,7 @@ Vector<G::dim> separation_of(const Pair<G>& pair, const ContactNode<G::dim>& at,
     return impulse;
   const double approach = dot<D>(difference<D>(relative, pair.change(impulse)), at.normal);
   const double wrong = approach - std::clamp(approach, 0.0, at.gap / dt);
-  return sum<D>(impulse, std::max(wrong / yielding, -dt * dot<D>(at.force, at.normal)), at.normal);
+  return sum<D>(impulse, std::max(wrong / yielding, -pressing), at.normal);
 }
 
 /// The largest tangential impulse of adhesion at a node; zero where the bodies do not touch.
@@ -215,6 +216,7 @@ void find_forces(Model<G>& model, const Vector<G::dim>& gravity, double dt, Fiel
 {
   constexpr int D = G::dim;
   contact.touching.clear();
+  contact.dt = dt;
   const VelocityField<G>&first = field_at(model, contact.first), &second = field_at(model, contact.second);
   ContactScratch<D>& scratch = contact.scratch;
   find_nodes_of_both(model, contact);
@@ -281,7 +283,8 @@ void separate_fields(Model<G>& model, double dt)
       if (is_light(first, at.node) || is_light(second, at.node))
         continue;
       Vector<D>&v1 = first.velocity[at.node], &v2 = second.velocity[at.node];
-      const Vector<D> impulse = separation_of(Pair<G>{first, second, at.node}, at, difference<D>(v1, v2), dt);
+      const double pressing = contact.dt * dot<D>(at.force, at.normal);
+      const Vector<D> impulse = separation_of(Pair<G>{first, second, at.node}, at, difference<D>(v1, v2), pressing, dt);
       at.shift = sum<D>({}, dt, impulse);
       v1 = sum<D>(v1, -1, mobility(first, at.node, impulse));
       v2 = sum<D>(v2, 1, mobility(second, at.node, impulse));

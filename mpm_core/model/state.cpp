@@ -257,12 +257,12 @@ void restore_same(Model<G>& model, Particles<D>&& particles, const std::vector<T
         take(model.migration, table, field.tractions);
     make_resting_cells(model.mesh, model.particles, field);
   }
+  for (const Table& table : ranks)
+    set_number(model, table, table.values.front());
   for (std::size_t k = 0; k < model.field_contacts.size(); ++k)
     for (const Table& table : cells)
       if (table.name == empty_touching_table<D>(k).name)
         take_touching(model, table, k);
-  for (const Table& table : ranks)
-    set_number(model, table, table.values.front());
   model.energy.stale = false;
   map_to_nodes(model); // so that nodal sums are there before the first step
 }

@@ -194,7 +194,7 @@ void bind_contacts_of(py::module_& m)
   m.def("contact_state", &contact_state<G>);
   m.def("add_field_contact",
         [](Model<G>& model, Index first, Index second, double friction, double adhesion, const Surface<D>& interface) {
-          model.field_contacts.push_back({first, second, friction, adhesion, interface, {}, {}, {}, {}});
+          model.field_contacts.push_back({first, second, friction, adhesion, interface, {}, {}, {}, {}, {}});
         });
   m.def("field_contact_state", &field_contact_state<G>);
   m.def("touching_nodes", &touching_nodes<G>);

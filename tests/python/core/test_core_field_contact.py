@@ -85,13 +85,15 @@ def test_an_impact_keeps_momentum_and_loses_energy(update, friction, dim):
     model.particles.set("velocity", np.where(second[:, None], -1.0, 0.5) * np.eye(dim)[0])
     momentum = np.array(model.report().momentum)
     energies, touched = [], []
-    for report in model.explicit(0.5, every=0.005, pic=0.02, stress_update=update):
+    # With FIRST single reports have an energy balance that light nodes spoil, also where nothing touches.
+    limit = None if update == mpm.StressUpdate.FIRST else 0.2
+    for report in model.explicit(0.5, every=0.005, pic=0.02, stress_update=update, energy_limit=limit):
         np.testing.assert_allclose(report.momentum, momentum, atol=1e-10 * report.mass)
         energies.append(report.kinetic_energy + report.stored_energy)
         touched.append(contact.nodes)
     assert touched[0] == 0 and max(touched) > 3
     assert max(energies) < (1 + 1e-9) * energies[0]
-    assert -1e-4 * energies[0] < report.friction_work < energies[0] - report.kinetic_energy
+    assert 0 < report.friction_work < energies[0] - report.kinetic_energy
     if dim == 2:  # in three dimensions the cells are four times as large
         assert abs(report.unexplained_fraction) < 0.01
     # two free blocks have separated again, and did not pass through one another
@@ -123,14 +125,15 @@ def test_nothing_is_felt_before_the_particles_touch():
     assert model.particles.position[second, 1].min() > 0.5 - 0.02  # it stays above
 
 
-def test_a_restart_goes_on_to_the_last_bit(tmp_path):
+@pytest.mark.parametrize("update", [mpm.StressUpdate.MODIFIED_LAST, mpm.StressUpdate.FIRST])
+def test_a_restart_goes_on_to_the_last_bit(tmp_path, update):
     model, contact = block_on_layer(30.0, 0.3, mesh=ALIGNED, adhesion=100.0)
-    list(model.explicit(0.02))
+    list(model.explicit(0.02, stress_update=update, energy_limit=None))
     model.save(tmp_path / "state.h5")
     same, _ = block_on_layer(30.0, 0.3, mesh=ALIGNED, contact=False)
     same.restore(tmp_path / "state.h5")
     for each in (model, same):
-        *_, report = each.explicit(0.05)
+        *_, report = each.explicit(0.05, stress_update=update, energy_limit=None)
     np.testing.assert_array_equal(model.particles.velocity, same.particles.velocity)
     np.testing.assert_array_equal(contact.impulse, same.field_contacts[0].impulse)
     assert report.friction_work == model.report().friction_work > 0
