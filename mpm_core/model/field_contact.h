@@ -17,8 +17,9 @@ struct ContactNode
   double gap;       ///< between the particles of the two; at least zero [m]
   Vector<D> force;  ///< on the second body [N]; the opposite acts on the first
   bool sticks;      ///< whether friction and adhesion stop all slip
-  Vector<D>
-      shift; ///< of the second body in this step beside its motion, times its mass [kg m]; the opposite of the first
+  /// By how much the second body moved in this step beside the motion of its particles, times its mass, and the first
+  /// body the other way [kg m].
+  Vector<D> shift;
 };
 
 /// How far the particles of two bodies reach along the normal, the second ones against it, seen from a node [m].
