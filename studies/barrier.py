@@ -1,9 +1,13 @@
-"""A granular flow hits a wall: force on the wall over time, against the balance of momentum.
+"""A granular flow or a debris flow hits a wall: force on the wall over time, against the balance of momentum.
 
 A layer of sand slides down a plane, whose inclination keeps its velocity constant, and is stopped by a wall at right angles
 to the plane. A bore travels back from the wall. The force that follows from the balance of mass and momentum depends on the
 pressure within the sand: it lies between that of a fluid of the same density and that of sand under Rankine's passive
 pressure. Coordinates are parallel and normal to the plane.
+
+With `--pressure-ratio` the sand is saturated, and water carries a part of its weight, as in a debris flow. Soil and water then have
+separate velocities, the plane has friction by the effective stress, and the bore in sand has Rankine's pressure of this
+part only (Iverson and Denlinger 2001, Flow of variably fluidized granular masses, J. Geophys. Res. 106).
 """
 
 from __future__ import annotations
@@ -17,13 +21,13 @@ import numpy as np
 from common import body_runs
 from common.body_runs import BodyRun, follow, mean_force
 from common.checkpoint import check_restart
-from common.checks import check_cells, check_whole
+from common.checks import check_cells, check_effect, check_whole
 from common.figures import Pictures, curve_figure
 from common.flow_impact import bore
 from common.history import History
-from common.movie import particle_movie
+from common.movie import QUANTITIES, WET_QUANTITIES, particle_movie
 from common.options import add_number, check, study_parser
-from common.plots import CURVES, Scene
+from common.plots import CURVES, WATER_PRESSURE, Scene, save_particles
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
@@ -33,7 +37,9 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
-GRAVITY = 9.81
+GRAVITY, WATER, GRAINS = 9.81, 1000.0, 2650.0  # m/s2, kg/m3, kg/m3
+PIC = 0.0005
+"""PIC fraction of saturated flows, whose critical steps are shorter"""
 COLUMNS = [
     "time_s",
     "force_factor",
@@ -59,13 +65,19 @@ def parser() -> ArgumentParser:
         p, "--froude", 2.0, "-", "Froude number, the ratio of the flow's velocity to that of shallow waves", at_least=1
     )
     add_number(p, "--slope", 20.0, "degrees", "inclination of the plane", at_least=0, below=45)
-    add_number(p, "--base-friction-angle", None, "degrees", "friction angle of the plane (default: its inclination)", at_least=0,
-               below=60)  # fmt: skip
+    add_number(p, "--base-friction-angle", None, "degrees", "friction angle of the plane (default: that under which "
+               "the flow keeps its velocity)", at_least=0, below=80)  # fmt: skip
     add_number(p, "--wall-friction-angle", 0.0, "degrees", "friction angle of the wall", at_least=0, below=60)
     add_number(p, "--front-angle", 25.0, "degrees", "inclination of the front to the plane", above=5, at_most=90)
     add_number(p, "--friction-angle", 30.0, "degrees", "friction angle of the sand", above=0, below=50)
     add_number(p, "--young", 5e6, "Pa", "Young's modulus of the sand", above=0)
-    add_number(p, "--density", 1600.0, "kg/m3", "density of the sand", above=0)
+    add_number(p, "--density", None, "kg/m3", "density of the sand (default: 1600 dry; saturated, that of grains of 2650 and water)",
+               above=0)  # fmt: skip
+    add_number(p, "--pressure-ratio", 0.0, "-", "ratio of the pore pressure to the total stress normal to the plane, at the start; "
+               "above 0 in saturated sand", at_least=0, below=1)  # fmt: skip
+    add_number(p, "--conductivity", 1e-5, "m/s", "saturated sand: hydraulic conductivity", above=0)
+    add_number(p, "--porosity", 0.45, "-", "saturated sand: porosity", above=0, below=1)
+    add_number(p, "--water-modulus", 2e7, "Pa", "saturated sand: bulk modulus of the water", above=0)
     add_number(p, "--duration", 8.0, "-", "duration of the run, in multiples of depth/velocity", above=0)
     add_number(
         p,
@@ -83,8 +95,20 @@ def parser() -> ArgumentParser:
 def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     a = p.parse_args(arguments)
+    wet = a.pressure_ratio > 0
+    check_effect(p, a, wet, ("--conductivity", "--porosity", "--water-modulus"), "--pressure-ratio above 0")
+    if a.density is None:
+        a.density = (1 - a.porosity) * GRAINS + a.porosity * WATER if wet else 1600.0
+    check(p, not wet or a.density > a.porosity * WATER,
+          lambda: f"--density is {a.density:g} kg/m3, expected that of saturated sand, above that of the water in it, "
+          f"{a.porosity * WATER:g} kg/m3")  # fmt: skip
+    if wet and a.pic == p.get_default("pic"):
+        a.pic = PIC
     if a.base_friction_angle is None:
-        a.base_friction_angle = a.slope
+        a.base_friction_angle = float(np.degrees(np.arctan(np.tan(np.radians(a.slope)) / (1 - a.pressure_ratio))))
+        check(p, a.base_friction_angle < 80,
+              lambda: f"--slope is {a.slope:g} degrees, expected a gentler one, on which sand slides steadily with --pressure-ratio "
+              f"{a.pressure_ratio:g}, or --base-friction-angle")  # fmt: skip
     check(p, a.length > 2 / np.tan(np.radians(a.front_angle)),
           lambda: f"--length is {a.length:g}, expected more than twice the front's, "
           f"{1 / np.tan(np.radians(a.front_angle)):.3g}")  # fmt: skip
@@ -119,14 +143,19 @@ def unit_force(a: Namespace) -> float:
 
 
 def at_rest(a: Namespace) -> float:
-    """Pressure on planes at right angles to the base over that on the base, in the flow [-]."""
+    """Effective stress on planes at right angles to the base over that on the base, in the flow [-]."""
     return float(1 - np.sin(np.radians(a.friction_angle)))
+
+
+def with_water(a: Namespace, ratio: float) -> float:
+    """Ratio of total stresses, of that of effective stresses."""
+    return (1 - a.pressure_ratio) * ratio + a.pressure_ratio
 
 
 def bores(a: Namespace) -> tuple[tuple[float, float], tuple[float, float]]:
     """Depth and force behind a bore in a fluid, and in sand under passive pressure; over those of the flow."""
     passive = np.tan(np.radians(45 + a.friction_angle / 2)) ** 2
-    return bore(a.froude, 1.0, 1.0), bore(a.froude, float(passive), at_rest(a))
+    return bore(a.froude, 1.0, 1.0), bore(a.froude, with_water(a, float(passive)), with_water(a, at_rest(a)))
 
 
 def build(a: Namespace) -> mpm.Model:
@@ -140,7 +169,7 @@ def build(a: Namespace) -> mpm.Model:
         young=a.young, poisson=0.3, cohesion=0.0, friction_angle=a.friction_angle, dilation_angle=0.0
     )
     model = mpm.Model(bridge.background_mesh(*mesh), sand)
-    model.outflow(4)
+    model.outflow((2, 4))  # what splashes over the wall
     if a.restart is not None:
         model.restore(a.restart)
         return model
@@ -150,10 +179,13 @@ def build(a: Namespace) -> mpm.Model:
     along, down = gravity_of(a)
     model.set_gravity((along, -down))
     particles = model.particles
-    stress = np.zeros((len(particles), 4))
-    stress[:, 1] = np.minimum(a.density * down * (particles.position[:, 1] - cell - h), 0.0)
-    stress[:, [0, 2]] = at_rest(a) * stress[:, 1:2]
-    particles.set("stress", stress)
+    weight = np.maximum(a.density * down * (cell + h - particles.position[:, 1]), 0.0)
+    effective = -(1 - a.pressure_ratio) * weight[:, None]
+    particles.set("stress", effective * [at_rest(a), 1.0, at_rest(a), 0.0])
+    if a.pressure_ratio > 0:
+        model.add_water(porosity=a.porosity, conductivity=a.conductivity, modulus=a.water_modulus, kozeny_carman=True,
+                        suction_limit=0.0)  # fmt: skip
+        model.set_pore_pressure(lambda x: a.pressure_ratio * a.density * down * np.maximum(cell + h - x[:, 1], 0.0))
     particles.set("velocity", np.tile([velocity(a), 0.0], (len(particles), 1)))
     # Particles are larger than their distance from the sides of cells.
     foot = cell + model.gap(mpm.Plane((0.0, cell), (0.0, 1.0))) - 1e-9 * h
@@ -205,7 +237,15 @@ def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> P
     title = f"$t$ = {result.history['time_s'][-1]:.2f} s"
     labels = "along the plane [m]", "normal to the plane [m]"
     pictures = body_runs.body_pictures(a, scene, result, folder, title, labels=labels)
-    return {"force": lambda: draw_force(folder / "force.png", a, result.history), **pictures} if pictures else {}
+    if scene is None or not pictures:
+        return {}
+    if a.pressure_ratio > 0:
+        last = result.frames[-1]
+        pictures["pore_pressure"] = partial(
+            save_particles, folder / "pore_pressure.png", scene, last["position"], last["volume"], last["pore_pressure"],
+            WATER_PRESSURE, title=title, bodies=last.get("bodies"), labels=labels,
+        )  # fmt: skip
+    return {"force": lambda: draw_force(folder / "force.png", a, result.history), **pictures}
 
 
 # --- 4. All together -------------------------------------------------------------------------------------------------
@@ -234,8 +274,8 @@ def main(arguments: list[str] | None = None) -> int:
     )
     return body_runs.write_results(
         a, model, result, folder, results, said, begin=begin,
-        movies=[particle_movie("flow and wall", scene, result.frames)],
-        captions={"force": "Force on the wall"},
+        movies=[particle_movie("flow and wall", scene, result.frames, QUANTITIES | (WET_QUANTITIES if a.pressure_ratio > 0 else {}))],
+        captions={"force": "Force on the wall", "pore_pressure": "Pore pressure in the end"},
         pictures=drawn(a, scene, result, folder),
     )  # fmt: skip
 

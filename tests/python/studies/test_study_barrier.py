@@ -34,6 +34,32 @@ def test_sand_at_a_wall_pushes_between_two_bores(tmp_path):
     assert fluid < found["force_N_per_m"] < passive
 
 
+def test_a_debris_flow_at_a_wall_pushes_as_a_fluid_does(tmp_path):
+    """Water carries four fifths of its weight. Both bores then differ by a twentieth; on these coarse cells the force is some 4 % below."""
+    barrier = importlib.import_module("barrier")
+    size = "--cell-size 0.25 --slope 8 --pressure-ratio 0.8 --no-pictures --no-film"
+    assert barrier.main([*size.split(), "--output", str(tmp_path)]) == 0
+    found = json.loads((tmp_path / "summary.json").read_text())
+    fluid, passive = found["force_of_bore_in_fluid_N_per_m"], found["force_of_bore_in_sand_N_per_m"]
+    assert fluid < passive < 1.06 * fluid
+    assert 0.9 * fluid < found["force_N_per_m"] < passive
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        (["--conductivity", "1e-4"], "--conductivity is given, expected --pressure-ratio above 0"),
+        (["--pressure-ratio", "0.95"], "--slope is 20 degrees, expected a gentler one"),
+        (["--pressure-ratio", "0.5", "--density", "400"], "--density is 400 kg/m3, expected that of saturated sand"),
+    ],
+)
+def test_options_of_a_debris_flow_that_do_not_fit(options, message, capsys):
+    barrier = importlib.import_module("barrier")
+    with pytest.raises(SystemExit):
+        barrier.parse(options)
+    assert message in capsys.readouterr().err
+
+
 def test_forces_of_wall_and_plane_stop_the_flow(tmp_path):
     barrier = importlib.import_module("barrier")
     size = "--cell-size 0.25 --particles-per-cell 3 --length 5 --slope 15"
