@@ -298,6 +298,14 @@ void average_outflow(const Mesh<G::dim>& mesh, NodeExchange& exchange, double dt
 }
 
 template <class G>
+double averaged_outflow(const Mesh<G::dim>& mesh, const WaterField<G>& field, Index cell, double dt)
+{
+  const double own = outflow(mesh, field, cell, dt);
+  const double mean = mean_of_nodes<G::dim>(mesh.cells[cell], field.motion.volumetric_strain);
+  return own + averaged_strain_fraction(field.motion.integration, cell) * (mean - own);
+}
+
+template <class G>
 std::vector<double> averaged_pressures(Model<G>& model)
 {
   constexpr int D = G::dim;
@@ -325,14 +333,6 @@ std::vector<double> averaged_pressures(Model<G>& model)
       for (Index p = run.first; p < run.last; ++p)
         pressures[p] = mean_of_nodes<D>(mesh.cells[run.cell], nodes);
   return pressures;
-}
-
-template <class G>
-double averaged_outflow(const Mesh<G::dim>& mesh, const WaterField<G>& field, Index cell, double dt)
-{
-  const double own = outflow(mesh, field, cell, dt);
-  const double mean = mean_of_nodes<G::dim>(mesh.cells[cell], field.motion.volumetric_strain);
-  return own + averaged_strain_fraction(field.motion.integration, cell) * (mean - own);
 }
 
 #define INSTANTIATE(G)                                                                                                 \
