@@ -116,7 +116,7 @@ def pore_water(particles: bridge.ParticleSite) -> Callable[[], None]:
 def main(arguments: list[str] | None = None) -> int:
     a = parser().parse_args(arguments)
     start = perf_counter()
-    site = read_site(a.site, comm, a.cell_size)
+    site = read_site(a.site, comm, a.cell_size, needed=("stages",))
     folder = open_results(a, comm)
     degree, averaged = int(a.elements[1]), site_slides.averages(a, site.laws.values())
     staged, rows, pictures, failed = carry_out(site, degree, folder, comm, nmd=averaged and degree == 1)

@@ -81,7 +81,7 @@ def comparison(site: Site, staged: bridge.FemSite) -> dict[str, float | None]:
 def main(arguments: list[str] | None = None) -> int:
     a: Namespace = parser().parse_args(arguments)
     start = perf_counter()
-    site = read_site(a.site, comm, a.cell_size)
+    site = read_site(a.site, comm, a.cell_size, needed=("stages",))
     folder = open_results(a, comm)
     staged, rows, pictures, stopped = carry_out(site, int(a.elements[1]), folder, comm)
     compared = comparison(site, staged) if a.compare and stopped is None else {}

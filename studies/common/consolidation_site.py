@@ -29,14 +29,26 @@ from mpi4py import MPI
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import water
+from fenics_bridge.mesh.names import known_tags
 from fenics_bridge.water.boundary import value_at
 
 from .consolidation_stages import GroundStage, Table, pressure_table, stages_of
-from .site_file import law_at, read_toml, supports_of, unit_weight_of
+from .checks import say
+from .site_file import CHANGES, Site, part_of_mesh, site_of
+from .site_keys import DAY, changes_of
 from .slope_case import GRAVITY
-from .water_site import DAY, condition, corners_of, directions_of, porous_soil, times_of, vertical_conductivity
+from .water_site import (
+    boundary_of,
+    by_law,
+    corners_of,
+    directions_of,
+    effective_laws,
+    read_water_table,
+    times_of,
+    vertical_conductivity,
+    wet_soils,
+)
 
-KEYS = ("mesh", "cell_size", "constants", "soils", "supports", "boundaries", "pressures", "points", "stages")
 BALANCED = 1e-9
 """Out-of-balance ratio of particles at the beginning"""
 POROUS = ("conductivity", "dip", "porosity")
@@ -46,15 +58,13 @@ POROUS = ("conductivity", "dip", "porosity")
 class ConsolidationSite:
     """A site of consolidation as its file describes it, on its mesh.
 
-    mesh: domain, cell tags and facet tags of the soils; laws, soils, unit_weight: by name of the soil, which is None without
-    water; pressures: tables in s; stages: the first is the beginning
+    site: laws, weights and supports; mesh: domain, cell tags and facet tags of its soils; soils: by name, None without water
+    pressures: tables in s; stages: the first is the beginning
     """
 
+    site: Site
     mesh: tuple
-    laws: dict[str, Any]
     soils: dict[str, water.PorousSoil | None]
-    unit_weight: dict[str, float]
-    supports: list[bridge.Support]
     pressures: dict[str, Table]
     points: dict[str, np.ndarray]
     stages: list[GroundStage]
@@ -81,7 +91,7 @@ class ConsolidationSite:
 
     def load(self, time: float) -> bridge.Load:
         """Weights and pressures at a time [s]."""
-        return bridge.Load(self.unit_weight, {tag: value_at(given, time) for tag, given in self.pressures.items()})
+        return bridge.Load(self.site.unit_weight, {tag: value_at(given, time) for tag, given in self.pressures.items()})
 
     def at_rest(self, element: water.Element, nmd: bool = False) -> water.Consolidation:
         """The ground at the beginning: in equilibrium under its weight, the pressures at time 0 and the steady flow. Collective.
@@ -102,14 +112,19 @@ class ConsolidationSite:
             raise mpm.InputError(
                 "soils: no soil that is there at the beginning has a conductivity, expected at least one"
             )
-        body = self.mesh if len(wet) == len(self.soils) else bridge.soil_mesh(*self.mesh, tag=list(wet))
-        flow = water.Seepage(body[0], wet, body[2], self.boundary, cell_tags=body[1])
+        body = part_of_mesh(self.mesh, wet)
+        here = known_tags(domain.comm, body[2])
+        absent = {name for name, tags in bridge.names_of(facet_tags).items() if not set(tags) & set(here)}
+        boundary = [
+            condition for condition in self.boundary if condition.facet_tag not in absent
+        ]  # not of soil to come
+        flow = water.Seepage(body[0], wet, body[2], boundary, cell_tags=body[1])
         flow.solve()
         fem = bridge.QuasiStatic(
             domain,
-            self.laws,
+            self.site.laws,
             facet_tags,
-            self.supports,
+            self.site.supports,
             element.value,
             nmd,
             as_particles=nmd,
@@ -121,8 +136,8 @@ class ConsolidationSite:
         fem.solve(self.load(0.0))
         if not fem.converged:
             raise mpm.RunError("the ground has no equilibrium under its weight and the initial pressures")
-        model = water.Consolidation(domain, self.laws, self.soils, facet_tags, self.supports, self.boundary, load=self.load,
-                                    element=element, nmd=nmd, cell_tags=cell_tags)  # fmt: skip
+        model = water.Consolidation(domain, self.site.laws, self.soils, facet_tags, self.site.supports, self.boundary,
+                                    load=self.load, element=element, nmd=nmd, cell_tags=cell_tags)  # fmt: skip
         model.reconfigure(off=off)
         model.initialise(fem, pressure)
         return model
@@ -142,17 +157,17 @@ class ConsolidationSite:
         self._require_stages_of_particles()
         dry = [soil for soil, porous in self.soils.items() if porous is None]
         facet_tags = water.waterless_facets(*self.mesh, dry) if dry else self.mesh[2]
-        model = mpm.Model(bridge.background_mesh(*self.mesh[:2], facet_tags), list(self.laws.values()))
-        there = [soil for soil in self.laws if soil not in self.stages[0].off]
+        model = mpm.Model(bridge.background_mesh(*self.mesh[:2], facet_tags), list(self.site.laws.values()))
+        there = [soil for soil in self.soils if soil not in self.stages[0].off]
         for soil in there:
             self.seed(model, soil, per_cell)
-        bridge.apply_supports(model, self.supports)
+        bridge.apply_supports(model, self.site.supports)
         model.set_gravity((0.0, -GRAVITY))
         pores = {soil: self.pores(soil) for soil in there}
         model.add_water(
             porosity={soil: porosity for soil, (porosity, _) in pores.items()},
             conductivity={soil: conductivity for soil, (_, conductivity) in pores.items()},
-            anisotropy=directions_of(self.soils.values()),
+            anisotropy=directions_of(by_law(self.soils, self.site)),
         )
         if dry:
             model.hold_pore_pressure(water.WATERLESS, 0.0)
@@ -163,9 +178,9 @@ class ConsolidationSite:
 
     def seed(self, model: mpm.Model, soil: str, per_cell: int) -> None:
         """Place the particles of a soil. Collective."""
-        density, law = self.unit_weight[soil] / GRAVITY, list(self.laws).index(soil)
+        density, laws = self.site.unit_weight[soil] / GRAVITY, list(self.site.laws)
         for tag in model.mesh.tags_of("cell", soil):
-            model.seed(density=density, per_cell=per_cell, cell_tag=tag, material=law)
+            model.seed(density=density, per_cell=per_cell, cell_tag=tag, material=laws.index(tag))
 
     def pores(self, soil: str) -> tuple[float, float]:
         """Porosity [-] and vertical conductivity [m/s] of particles; those of another soil where it has none."""
@@ -202,32 +217,20 @@ def read_consolidation_site(
     Raises:
         InputError: on all ranks, with the file, the key and what was expected.
     """
-    table = read_toml(path, KEYS, needed=("mesh", "soils", "boundaries", "points"))
-    constants = dict(table.get("constants", {}))
-    size = table.get("cell_size") if cell_size is None else cell_size
-    if size is not None:
-        constants["cell_size"] = size
-    mesh = bridge.read_mesh(path.parent / table["mesh"], comm, parameters=constants)
+    table = read_water_table(path, needed=("boundaries", "points"))
+    soils, rows = wet_soils(table, path, POROUS), table.get("stages", [])
+    changes = changes_of(rows, [key for key in CHANGES if key != "excavate"])
+    if changes:
+        say(f"{path}: this study leaves out {changes}")
+    site = site_of(effective_laws(table), path, comm, cell_size)
+    mesh = part_of_mesh((site.domain, site.cell_tags, site.facet_tags), soils)
     for name in pressures or {}:
         if name not in mesh[2].names:
             raise mpm.InputError(f"--pressures names '{name}', expected some of {', '.join(mesh[2].names)}")
-    laws, soils, weights = {}, {}, {}
-    for name, given in table["soils"].items():
-        where = f"{path}: soils.{name}"
-        weights[name] = unit_weight_of(given, where)
-        porous = {key: given[key] for key in POROUS if key in given}
-        soils[name] = porous_soil(porous, where) if porous else None
-        laws[name] = law_at({k: v for k, v in given.items() if k not in (*POROUS, "unit_weight")}, 0.0, where)
-    boundary = {
-        name: condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()
-    }
-    stages = stages_of(table.get("stages", []), list(soils), boundary, f"{path}: stages")
-    if len(stages) > 1:
-        mesh = bridge.soil_mesh(*mesh, tag=list(soils))
+    stages = stages_of(rows, list(soils), boundary_of(table, path), f"{path}: stages")
     given = {name: pressure_table(one, f"{path}: pressures.{name}") for name, one in table.get("pressures", {}).items()}
     points = {name: _point(given, f"{path}: points.{name}") for name, given in table["points"].items()}
-    supports = supports_of(table, path, mesh[0], mesh[2])
-    return ConsolidationSite(mesh, laws, soils, weights, supports, given | (pressures or {}), points, stages)
+    return ConsolidationSite(site, mesh, soils, given | (pressures or {}), points, stages)
 
 
 def _point(given: Any, where: str) -> np.ndarray:

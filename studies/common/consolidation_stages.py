@@ -11,9 +11,9 @@ import numpy as np
 
 import mpm_core as mpm
 
-from .water_site import DAY, condition
+from .site_keys import DAY
+from .water_site import condition
 
-STAGE_KEYS = ("name", "day", "duration", "fill", "excavate", "boundaries")
 Table = tuple[tuple[float, float], ...]
 
 
@@ -80,8 +80,12 @@ def pressures_of(words: Iterable[str]) -> dict[str, Table]:
     return found
 
 
-def stages_of(given: Any, soils: Sequence[str], boundary: Mapping[str, Any], where: str) -> list[GroundStage]:
-    """Stages of construction, the first of which is the beginning: soils that no later stage places are there then.
+def stages_of(
+    given: Sequence[dict], soils: Sequence[str], boundary: Mapping[str, Any], where: str
+) -> list[GroundStage]:
+    """Stages of construction, the first of which is the beginning.
+
+    A first stage without a day says which soils are there then; otherwise those are that no later stage places.
 
     Args:
         given: rows of the file.
@@ -92,26 +96,25 @@ def stages_of(given: Any, soils: Sequence[str], boundary: Mapping[str, Any], whe
     Raises:
         InputError: an unknown key or soil, days that do not rise, or soil that is placed twice or dug away where there is none.
     """
-    rows = given if isinstance(given, list) else [given]
-    names = [_names(row, "fill", f"{where}[{k}]") for k, row in enumerate(rows)]
-    off = tuple(soil for soil in soils if any(soil in fill for fill in names))
-    stages = [GroundStage("beginning", 0.0, 0.0, off, dict(boundary))]
-    for k, row in enumerate(rows):
-        stages.append(_stage(row, stages[-1], soils, f"{where}[{k}]", first=k == 0))
+    names = [_names(row, "fill", f"{where}[{k}]") for k, row in enumerate(given)]
+    begins = bool(given) and "day" not in given[0]
+    later = {soil for fill in names[begins:] for soil in fill}
+    off = tuple(soil for soil in soils if (soil not in names[0] if begins else soil in later))
+    changed = _boundary_of(given[0], f"{where}[0]") if begins else {}
+    stages = [GroundStage("beginning", 0.0, 0.0, off, {**boundary, **changed})]
+    for k, row in list(enumerate(given))[begins:]:
+        stages.append(_stage(row, stages[-1], soils, f"{where}[{k}]", first=len(stages) == 1))
     return stages
 
 
 def _stage(row: dict, before: GroundStage, soils: Sequence[str], where: str, first: bool) -> GroundStage:
-    for key in row:
-        if key not in STAGE_KEYS:
-            raise mpm.InputError(f"{where}: unknown key {key!r}, expected some of {', '.join(STAGE_KEYS)}")
     day, duration = _days(row, "day", where), _days(row, "duration", where, 0.0)
     if day < before.start / DAY or (day == before.start / DAY and not first):
         raise mpm.InputError(
             f"{where}: day {day:g} comes after day {before.start / DAY:g}, expected stages of rising days"
         )
     fill, gone = _names(row, "fill", where), _names(row, "excavate", where)
-    if not fill and not gone:
+    if not set(row) - {"name", "day", "duration"}:
         raise mpm.InputError(f"{where} has neither fill nor excavate, expected soils to place or to dig away")
     for soil in (*fill, *gone):
         if soil not in soils:
@@ -119,16 +122,15 @@ def _stage(row: dict, before: GroundStage, soils: Sequence[str], where: str, fir
         if (soil in fill) != (soil in before.off):
             raise mpm.InputError(f"{where}: {soil!r} is {'not ' if soil in before.off else ''}there before this stage")
     off = tuple(soil for soil in soils if (soil in before.off or soil in gone) and soil not in fill)
-    changed = {
-        name: condition(name, one, f"{where}.boundaries.{name}") for name, one in row.get("boundaries", {}).items()
-    }
     name = str(row.get("name", ", ".join((*fill, *gone))))
-    return GroundStage(name, DAY * day, DAY * duration, off, {**before.boundary, **changed})
+    return GroundStage(name, DAY * day, DAY * duration, off, {**before.boundary, **_boundary_of(row, where)})
 
 
-def _names(row: Any, key: str, where: str) -> list[str]:
-    if not isinstance(row, dict):
-        raise mpm.InputError(f"{where} is {row!r}, expected tables [[stages]]")
+def _boundary_of(row: Mapping[str, Any], where: str) -> dict[str, Any]:
+    return {name: condition(name, one, f"{where}.boundaries.{name}") for name, one in row.get("boundaries", {}).items()}
+
+
+def _names(row: Mapping[str, Any], key: str, where: str) -> list[str]:
     names = row.get(key, [])
     names = [names] if isinstance(names, str) else names
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
@@ -139,5 +141,6 @@ def _names(row: Any, key: str, where: str) -> list[str]:
 def _days(row: dict, key: str, where: str, default: float | None = None) -> float:
     value = row.get(key, default)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or value < 0:
-        raise mpm.InputError(f"{where}: {key} is {value!r}, expected a number of days from 0 on")
+        when = ", when the stage begins" if key == "day" else ""
+        raise mpm.InputError(f"{where}: {key} is {value!r}, expected a number of days from 0 on{when}")
     return float(value)

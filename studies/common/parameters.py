@@ -72,8 +72,7 @@ def checked_values(source: str, table: Mapping[str, Any], actions: Sequence[argp
     for key, value in table.items():
         key = present_name(key, actions)
         if key not in known:
-            expected = did_you_mean(key, known) or f", expected some of {', '.join(known)}"
-            raise ParameterError(f"{source}: unknown key '{key}'{expected}")
+            raise ParameterError(f"{source}: {unknown_key(key, known)}")
         try:
             values[known[key].dest] = None if value is None else _from_toml(known[key], value)
         except (argparse.ArgumentTypeError, ValueError) as error:
@@ -96,6 +95,12 @@ def did_you_mean(word: str, names: Iterable[str]) -> str:
     """What a message adds for a word that is nearly one of some names; empty where it is not."""
     near = get_close_matches(word, list(names), cutoff=0.8)
     return f"; did you mean {' or '.join(near)}?" if near else ""
+
+
+def unknown_key(key: str, known: Iterable[str]) -> str:
+    """What a message says of a key that is not among those that are known."""
+    known = list(known)
+    return f"unknown key '{key}'{did_you_mean(key, known) or ', expected some of ' + ', '.join(known)}"
 
 
 def plain_values(parameters: Sequence[Parameter]) -> dict[str, Any]:

@@ -19,37 +19,36 @@ Example of a file:
     [supports]                         # by default base fixed, and left, right and sides on rollers
     base = "fixed"
 
-    [[stages]]                         # for the studies embankment and excavation
+    [[stages]]                         # for the studies embankment, excavation and safety
     name = "in situ"
     fill = ["clay"]
+
+`site_keys` has all keys of such files, and `meshes/dike.toml` is an example for all studies.
 """
 
 from __future__ import annotations
 
-import argparse
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomllib
 from mpi4py import MPI
 from mpm_core.law_warnings import keeps_volume
 
 import fenics_bridge as bridge
 import mpm_core as mpm
 
-from .options import add_number, study_parser
-from .parameters import ParameterError, checked_values
-from .slope_case import GRAVITY, add_soil_options
-from .soils import add_law_options, law_of
+from .checks import say
+from .site_keys import changes_of, part_of, read_site_table
+from .site_laws import is_number, law_at, law_keys, located, unit_weight_of
+from .slope_case import GRAVITY
 
-KEYS = ("mesh", "cell_size", "axisymmetric", "constants", "soils", "laws", "supports", "stages", "classes")
-STAGE_KEYS = (
-    "name", "fill", "excavate", "law", "unit_weight", "pressure", "support", "release", "water_level", "reset_displacement"
-)  # fmt: skip
+AIR = ("air", "water", "empty")
+"""Groups of a mesh that hold no soil by their names"""
+CHANGES = ("excavate", "law", "unit_weight", "pressure", "support", "release")
+"""What a stage may change beside soils that it places"""
 DEFAULT_SUPPORTS = {"base": "fixed", "left": "roller", "right": "roller", "sides": "roller"}
 
 
@@ -59,7 +58,7 @@ class Site:
 
     domain, cell_tags, facet_tags: the whole mesh, with cells that never hold soil; soils: names, in the file's order
     laws: by cell tag; unit_weight: by soil [N/m3]; supports: of `fenics_bridge`; stages: as for `carry_out`
-    further_laws: those that come in by stages; axisymmetric: whether it is a half section
+    further_laws: those that come in by stages; axisymmetric: whether it is a half section; stage_rows: stages as in the file
     """
 
     domain: Any
@@ -72,6 +71,7 @@ class Site:
     stages: list[bridge.Stage]
     further_laws: list[Any] = field(default_factory=list)
     axisymmetric: bool = False
+    stage_rows: Sequence[dict[str, Any]] = ()
 
     @property
     def geometry(self) -> mpm.Geometry | None:
@@ -84,7 +84,7 @@ class Site:
         Linear elements average volumetric strains where a soil of the site keeps its volume, unless `nmd` says otherwise.
         """
         options.setdefault("nmd", degree == 1 and keeps_volume([*self.laws.values(), *self.further_laws]))
-        body, cell_tags, facet_tags = bridge.soil_mesh(self.domain, self.cell_tags, self.facet_tags, tag=self.soils)
+        body, cell_tags, facet_tags = self.body()
         return bridge.QuasiStatic(
             body,
             laws or self.laws,
@@ -95,6 +95,10 @@ class Site:
             geometry=self.geometry,
             **options,
         )
+
+    def body(self) -> tuple[Any, Any, Any]:
+        """Domain, cell tags and facet tags of the soils alone. Collective."""
+        return bridge.soil_mesh(self.domain, self.cell_tags, self.facet_tags, tag=self.soils)
 
     def model(self, more: Sequence[Any] = ()) -> tuple[mpm.Model, dict[int, int]]:
         """A model without particles on the whole mesh, and the number of the law of each tag; `more` laws last. Collective."""
@@ -128,18 +132,11 @@ class Site:
 
     def left_out_at_once(self) -> str:
         """A warning of what stages change beside placing soils, for a study that has all soils at once; else no text."""
-        found = []
-        for stage in self.stages:
-            weights = [
-                weight for soil, weight in stage.unit_weight.items() if weight != self.unit_weight.get(str(soil))
-            ]
-            changes = {"excavate": stage.excavate, "law": stage.law, "unit_weight": weights, "pressure": stage.pressure,
-                       "support": stage.support, "release": stage.release, "water_level": stage.pore_pressure}  # fmt: skip
-            found += [f"{key} of {stage.name!r}" for key, change in changes.items() if change]
-        if not found:
+        changes = changes_of(self.stage_rows, (*CHANGES, "water_level"))
+        if not changes:
             return ""
         return (
-            f"all soils are there at once, and what the stages of the site change is left out: {', '.join(found)}; the study safety "
+            f"all soils are there at once, and what the stages of the site change is left out: {changes}; the study safety "
             "takes it into account in its factor by finite elements, and the study embankment in a slide (docs/howto/stages.md)"
         )
 
@@ -160,17 +157,35 @@ class Site:
         return bridge.Load({soil: factor * weight for soil, weight in self.unit_weight.items()})
 
 
-def read_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) -> Site:
-    """Read a site and make its mesh. Collective.
+def read_site(path: Path, comm: MPI.Comm, cell_size: float | None = None, needed: Sequence[str] = ()) -> Site:
+    """Read a site and make its mesh; warns of water and loads that only other studies use. Collective.
 
     Args:
         path: of the TOML file.
         cell_size: [m], instead of the one in the file.
+        needed: keys that the study needs besides mesh and soils.
 
     Raises:
         InputError: on all ranks, with the file, the key and what was expected.
     """
-    return site_of(_table(path), path, comm, cell_size)
+    table = read_site_table(path, needed)
+    _warn_of_water(table, path)
+    warn_of_pressures(table, path)
+    return site_of(table, path, comm, cell_size)
+
+
+def _warn_of_water(table: dict[str, Any], path: Path) -> None:
+    """Warn of the water of a file for a study that has only that of stages."""
+    if "boundaries" in table and not changes_of(table.get("stages", []), ("water_level",)):
+        say(f"{path}: the water of [boundaries] is left out here, and the soils are without pore pressure; the studies drawdown, "
+            "rain and consolidation have it, or a stage with water_level")  # fmt: skip
+
+
+def warn_of_pressures(table: dict[str, Any], path: Path) -> None:
+    """Warn of the loads of a file for a study that has none that change in time."""
+    if table.get("pressures"):
+        say(f"{path}: the loads of [pressures] are left out here; the study consolidation has them, and the studies of stages "
+            "the pressure of a stage")  # fmt: skip
 
 
 def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = None) -> Site:
@@ -179,11 +194,14 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
     if not isinstance(axisymmetric, bool):
         raise mpm.InputError(f"{path}: axisymmetric is {axisymmetric!r}, expected true or false")
     domain, cell_tags, facet_tags = site_mesh(table, path, comm, cell_size)
+    warn_of_no_soil(table, path, cell_tags)
     soils, laws, weights = table["soils"], {}, {}
     for soil, given in soils.items():
         where = f"{path}: soils.{soil}"
         weights[soil] = unit_weight_of(given, where)
-        parameters = _located({key: value for key, value in given.items() if key != "unit_weight"}, path)
+        parameters = located(part_of(given, law_keys()), path)
+        if not set(parameters) - {"porosity"}:
+            raise mpm.InputError(f"{where} has no law, which this study needs: material, and the parameters of the law")
         if any(isinstance(value, dict) for value in parameters.values()):
             cell_tags, heights = bridge.graded_tags(
                 domain, cell_tags, soil, lambda x: x[:, -1], table.get("classes", 20)
@@ -193,101 +211,51 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
             law = law_at(parameters, 0.0, where)
             laws |= dict.fromkeys(bridge.names_of(cell_tags).get(soil, (soil,)), law)
     others = {
-        name: law_at(_located(given, path), 0.0, f"{path}: laws.{name}")
-        for name, given in table.get("laws", {}).items()
+        name: law_at(located(given, path), 0.0, f"{path}: laws.{name}") for name, given in table.get("laws", {}).items()
     }
+    rows = table.get("stages", [])
     site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, supports_of(table, path, domain, facet_tags), [],
-                list(others.values()), axisymmetric)  # fmt: skip
-    site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(table.get("stages", []))]
+                list(others.values()), axisymmetric, rows)  # fmt: skip
+    site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(rows)]
+    if rows and "day" in rows[0]:  # what these stages do not place is there before them
+        placed = {soil for stage in site.stages for soil in stage.fill}
+        there = {soil: weight for soil, weight in weights.items() if soil not in placed}
+        if there:
+            site.stages[0] = replace(site.stages[0], reset_displacement=True)
+            site.stages.insert(0, bridge.Stage("beginning", fill=list(there), unit_weight=there))
     return site
-
-
-def unit_weight_of(soil: dict, where: str) -> float:
-    """Unit weight [N/m3] in the table of a soil; where: it stands, for messages."""
-    if "unit_weight" not in soil:
-        raise mpm.InputError(f"{where} has no unit_weight [N/m3]")
-    if not is_number(soil["unit_weight"]) or soil["unit_weight"] < 0:
-        raise mpm.InputError(f"{where}: unit_weight is {soil['unit_weight']!r}, expected a number from 0 on [N/m3]")
-    return float(soil["unit_weight"])
-
-
-def is_number(value: Any) -> bool:
-    """Whether a value of a site's file is a finite number."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def site_mesh(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None) -> tuple[Any, Any, Any]:
     """The mesh that the table of a site's file names, cell tags and facet tags; `cell_size` [m] instead of the one there."""
     size = table.get("cell_size") if cell_size is None else cell_size
     constants = table.get("constants", {}) | ({} if size is None else {"cell_size": size})
-    return bridge.read_mesh(path.parent / table["mesh"], comm, parameters=constants)
+    mesh = path.parent / str(table["mesh"])
+    try:
+        return bridge.read_mesh(mesh, comm, parameters=constants)
+    except mpm.InputError as error:
+        raise mpm.InputError(f"{path}: mesh: {error}") from None
+
+
+def part_of_mesh(mesh: tuple[Any, Any, Any], soils: Collection[str]) -> tuple[Any, Any, Any]:
+    """Domain, cell tags and facet tags of some soils; the mesh itself where it has no others. Collective."""
+    return mesh if set(bridge.names_of(mesh[1])) == set(soils) else bridge.soil_mesh(*mesh, tag=list(soils))
+
+
+def warn_of_no_soil(table: dict, path: Path, cell_tags: Any) -> None:
+    """Warn of groups of the mesh that are not among the soils of a site: their cells hold no soil."""
+    declared = table.get("air", [])
+    named = {*table["soils"], *AIR, *([declared] if isinstance(declared, str) else declared)}
+    left = [name for name in bridge.names_of(cell_tags) if name not in named]
+    if left:
+        groups = ", ".join(map(repr, left))
+        say(f"{path} has no soil for {groups} of the mesh, which therefore holds none, as air; add [soils.NAME], or air = {left!r} "
+            "where it is meant")  # fmt: skip
 
 
 def cell_size_of(path: Path) -> float | None:
     """Cell size [m] that a site names; None where it names none."""
-    return _table(path).get("cell_size")
-
-
-def law_at(table: dict, height: float, where: str) -> Any:
-    """The law that a table describes, where its parameters that grow with depth have their value at a height [m]."""
-    parser = study_parser(None)
-    add_soil_options(parser, dilation_angle=0.0)
-    add_law_options(parser)
-    add_number(
-        parser, "--shear-strength", None, "Pa", "undrained shear strength, for tresca: instead of cohesion", at_least=0
-    )
-    values = vars(parser.parse_args([]))
-    try:
-        here = {key.replace("_", "-"): _at_height(key, value, height) for key, value in table.items()}
-        values |= checked_values(where, here, parser._actions)
-    except (ParameterError, ValueError) as error:
-        raise mpm.InputError(str(error) if isinstance(error, ParameterError) else f"{where}: {error}") from None
-    if values["shear_strength"] is not None:
-        values["cohesion"] = values["shear_strength"]
-    return law_of(argparse.Namespace(**values))
-
-
-def _located(table: dict, path: Path) -> dict:
-    """The table of a law whose files are beside the site's."""
-    files = {key: str(path.parent / table[key]) for key in ("umat", "python_law", "python-law") if key in table}
-    return table | files
-
-
-def _at_height(name: str, value: Any, height: float) -> Any:
-    """A parameter as it is, or its value at a height: value + per_metre * (top - height)."""
-    if not isinstance(value, dict):
-        return value
-    if set(value) != {"value", "per_metre", "top"} or not all(map(is_number, value.values())):
-        raise ValueError(
-            f"{name} is {value}, expected {{value = , per_metre = , top = }}: it grows with depth below top [m]"
-        )
-    return float(value["value"] + value["per_metre"] * max(value["top"] - height, 0.0))
-
-
-def _table(path: Path) -> dict:
-    return read_toml(path, KEYS, needed=("mesh", "soils"))
-
-
-def read_toml(path: Path, keys: Sequence[str], needed: Sequence[str]) -> dict:
-    """A TOML file as a table.
-
-    Raises:
-        InputError: it cannot be read, is not TOML, has a key that is not among `keys` or lacks one that is needed.
-    """
-    try:
-        with open(path, "rb") as file:
-            table = tomllib.load(file)
-    except OSError as error:
-        raise mpm.InputError(f"cannot read the site {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise mpm.InputError(f"the site {path} is not TOML: {error}") from None
-    for key in table:
-        if key not in keys:
-            raise mpm.InputError(f"{path}: unknown key {key!r}, expected some of {', '.join(keys)}")
-    for key in needed:
-        if key not in table:
-            raise mpm.InputError(f"{path} has no {key!r}")
-    return table
+    return read_site_table(path).get("cell_size")
 
 
 def supports_of(table: dict, path: Path, domain: Any, facet_tags: Any) -> list[bridge.Support]:
@@ -316,9 +284,6 @@ def _support(name: str, kind: str, where: str, domain: Any, facet_tags: Any) -> 
 
 def _stage(given: dict, number: int, site: Site, laws: dict[str, Any], path: Path) -> bridge.Stage:
     where = f"{path}: stages[{number}]"
-    for key in given:
-        if key not in STAGE_KEYS:
-            raise mpm.InputError(f"{where}: unknown key {key!r}, expected some of {', '.join(STAGE_KEYS)}")
     for key in ("law", "unit_weight", "pressure", "support"):
         if not isinstance(given.get(key, {}), dict):
             raise mpm.InputError(f"{where}: {key} is {given[key]!r}, expected a table such as {key} = {{name = value}}")

@@ -1,8 +1,8 @@
 """A site of slopes under water that rises, falls or rains on them: mesh, soils with law and conductivity, supports, and water.
 
-`meshes/drawdown.toml` and `meshes/rain.toml` are examples. The file has the keys of a site of stages (but for the stages) and
-those of a site of seepage: each soil has a law of effective stresses, a unit weight, conductivity and a retention curve. Cells of
-the mesh that no soil names are air, or water, into which the soil may slide.
+`meshes/drawdown.toml` and `meshes/rain.toml` are examples. The file has the keys of a site of stages and those of a site of
+seepage: each soil has a law of effective stresses, a unit weight, conductivity and a retention curve. All soils are there at once.
+Cells of the mesh that no soil names are air, or water, into which the soil may slide.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ import numpy as np
 from mpi4py import MPI
 
 import fenics_bridge as bridge
+import mpm_core as mpm
 from fenics_bridge import water
 from fenics_bridge.water.boundary import value_at
 from fenics_bridge.water.soils import WATER_WEIGHT
 
-from .site_file import Site, read_toml, site_of
-from .water_site import SOIL_KEYS, condition, corners_of, porous_soil, times_of
-
-KEYS = ("mesh", "cell_size", "constants", "soils", "supports", "boundaries")
-MECHANICAL = ("mesh", "cell_size", "constants", "supports")
+from .checks import say
+from .site_file import CHANGES, Site, site_of, warn_of_pressures
+from .site_keys import changes_of
+from .water_site import boundary_of, corners_of, effective_laws, read_water_table, times_of, wet_soils
 
 
 @dataclass
@@ -115,16 +115,21 @@ def read_slope_site(path: Path, comm: MPI.Comm, cell_size: float | None = None, 
     Raises:
         InputError: on all ranks, with the file, the key and what was expected.
     """
-    table = read_toml(path, KEYS, needed=("mesh", "soils", "boundaries"))
-    porous, soils = {}, {}
-    for name, given in table["soils"].items():
-        porous[name] = porous_soil({k: v for k, v in given.items() if k in SOIL_KEYS}, f"{path}: soils.{name}")
-        soils[name] = {k: v for k, v in given.items() if k not in SOIL_KEYS}
-    boundary = [condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()]
-    mechanical = {key: table[key] for key in MECHANICAL if key in table} | {"soils": soils}
-    site = site_of(mechanical, path, comm, cell_size)
-    body = bridge.soil_mesh(site.domain, site.cell_tags, site.facet_tags, tag=site.soils)
-    return SlopeSite(site, porous, [_slower(one, slower) for one in boundary], body)
+    table = read_water_table(path, needed=("boundaries",))
+    porous = {}
+    for name, soil in wet_soils(table, path).items():
+        if soil is None:
+            raise mpm.InputError(
+                f"{path}: soils.{name} has no conductivity [m/s], which this study needs for the flow of water"
+            )
+        porous[name] = soil
+    changes = changes_of(table.get("stages", []), (*CHANGES, "boundaries"))
+    if changes:
+        say(f"{path}: all soils are there at once, and this study leaves out {changes}")
+    warn_of_pressures(table, path)
+    boundary = [_slower(one, slower) for one in boundary_of(table, path).values()]
+    site = site_of(effective_laws(table), path, comm, cell_size)
+    return SlopeSite(site, porous, boundary, site.body())
 
 
 def _slower(condition: Any, factor: float) -> Any:

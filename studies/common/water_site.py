@@ -17,7 +17,7 @@ Example of a file:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Collection, Container, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,24 +25,13 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import water
 
-from .site_file import read_toml, site_mesh
-
-DAY = 86400.0
-MM_PER_DAY = 1e-3 / DAY
-KEYS = ("mesh", "cell_size", "constants", "soils", "boundaries")
-CURVES = {"van_genuchten": water.VanGenuchten, "gardner": water.Gardner, "free_surface": water.FreeSurface,
-          "tabulated": water.Tabulated}  # fmt: skip
-SOIL_KEYS = ("conductivity", "dip", "porosity", "compressibility", *CURVES)
-CONDITIONS: dict[str, tuple[Callable, float]] = {
-    "head": (water.Head, 1.0),
-    "reservoir": (water.Reservoir, 1.0),
-    "flux": (water.Flux, 1.0),
-    "rain": (water.Rain, MM_PER_DAY),
-}
-"""Boundary condition by its key, and what one of its units is in SI."""
+from .checks import say
+from .site_file import Site, part_of_mesh, site_mesh, warn_of_no_soil
+from .site_keys import CONDITIONS, CURVES, DAY, FLOW, UNDRAINED, changes_of, part_of, read_site_table
 
 
 @dataclass
@@ -104,18 +93,57 @@ def read_water_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) 
     Raises:
         InputError: on all ranks, with the file, the key and what was expected.
     """
-    table = read_toml(path, KEYS, needed=("mesh", "soils", "boundaries"))
-    domain, cell_tags, facet_tags = site_mesh(table, path, comm, cell_size)
-    soils = {name: porous_soil(given, f"{path}: soils.{name}") for name, given in table["soils"].items()}
-    boundary = [condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()]
-    return WaterSite(domain, cell_tags, facet_tags, soils, boundary, varies=bool(times_of(boundary)))
+    table = read_water_table(path, needed=("boundaries",))
+    soils = wet_soils(table, path)
+    dry = [name for name, soil in soils.items() if soil is None]
+    if len(dry) == len(soils):
+        raise mpm.InputError(f"{path} has no soil with a conductivity [m/s], which the flow of water needs")
+    if dry:
+        say(f"{path}: the flow leaves out {', '.join(map(repr, dry))}, which has no conductivity")
+    changes = changes_of(table.get("stages", []), ("excavate", "boundaries"))
+    if changes:
+        say(f"{path}: all soils are there at once, and this study leaves out {changes}")
+    mesh = site_mesh(table, path, comm, cell_size)
+    warn_of_no_soil(table, path, mesh[1])
+    wet = {name: soil for name, soil in soils.items() if soil is not None}
+    boundary = boundary_of(table, path)
+    return WaterSite(*part_of_mesh(mesh, wet), wet, list(boundary.values()), varies=bool(times_of(boundary.values())))
+
+
+def read_water_table(path: Path, needed: Sequence[str]) -> dict[str, Any]:
+    """The file of a site, for a study that computes its water in plane sections; needed: keys besides mesh and soils."""
+    table = read_site_table(path, needed)
+    if table.get("axisymmetric", False) is not False:
+        raise mpm.InputError(
+            f"{path}: axisymmetric is {table['axisymmetric']!r}, expected false: this study has plane sections"
+        )
+    return table
+
+
+def wet_soils(table: dict[str, Any], path: Path, keys: Collection[str] = FLOW) -> dict[str, water.PorousSoil | None]:
+    """The pores of each soil of a file by some keys; None for a soil without any, which holds no water."""
+    found = {}
+    for name, given in table["soils"].items():
+        porous = part_of(given, keys)
+        undrained = set(porous) <= set(UNDRAINED) and given.get("undrained", False)  # its porosity is that of the law
+        found[name] = porous_soil(porous, f"{path}: soils.{name}") if porous and not undrained else None
+    return found
+
+
+def effective_laws(table: dict[str, Any]) -> dict[str, Any]:
+    """The file of a site with laws of effective stresses only, for a study that computes the water of the soils."""
+    soils = {name: {k: v for k, v in given.items() if k not in UNDRAINED} for name, given in table["soils"].items()}
+    return table | {"soils": soils}
+
+
+def boundary_of(table: dict[str, Any], path: Path) -> dict[str, Any]:
+    """The conditions of the water in a file, by boundary."""
+    return {name: condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()}
 
 
 def porous_soil(given: dict, where: str) -> water.PorousSoil:
-    """The soil that a table describes; where: it stands, for messages."""
+    """The soil that a table of `FLOW` describes; where: it stands, for messages."""
     for key in given:
-        if key not in SOIL_KEYS:
-            raise mpm.InputError(f"{where}: unknown key {key!r}, expected some of {', '.join(SOIL_KEYS)}")
         if key in CURVES and not isinstance(given[key], dict):
             raise mpm.InputError(f"{where}: {key} is {given[key]!r}, expected a table such as {key} = {{name = value}}")
         if not _has_numbers(given[key]):
@@ -153,6 +181,13 @@ def _of_strata(conductivity: Any, dip: float) -> Any:
 def vertical_conductivity(soil: water.PorousSoil) -> float:
     """Conductivity of a soil along the last axis [m/s], which particles have as a number."""
     return float(np.ravel(soil.conductivity)[-1])
+
+
+def by_law(soils: dict[str, Any], site: Site) -> list[Any]:
+    """What is given by the name of a soil, for each law of a site, whose parameters may grow with depth."""
+    tags = bridge.names_of(site.cell_tags)
+    by_tag = {tag: one for name, one in soils.items() for tag in tags.get(name, (name,))}
+    return [by_tag[tag] for tag in site.laws]
 
 
 def directions_of(soils: Iterable[water.PorousSoil | None]) -> list | None:

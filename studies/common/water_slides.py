@@ -28,7 +28,7 @@ from .options import add_choice, add_flag, add_number
 from .scenes import scene_of
 from .site_slides import add_slide_options, averages, slide, slide_pictures
 from .slope_site import SlopeSite
-from .water_site import DAY, directions_of, in_days, vertical_conductivity
+from .water_site import DAY, by_law, directions_of, in_days, vertical_conductivity
 from .water_slopes import Instant, lowest
 
 comm = MPI.COMM_WORLD
@@ -99,9 +99,7 @@ def let_water_flow(slope: SlopeSite, instant: Instant, model: mpm.Model) -> None
     """
     model.particles.set("traction", np.zeros_like(model.particles.position))
     soils = slope.porous
-    tags = bridge.names_of(slope.site.cell_tags)
-    by_tag = {tag: soil for name, soil in soils.items() for tag in tags.get(name, (name,))}
-    directions = directions_of(by_tag[tag] for tag in slope.site.laws)
+    directions = directions_of(by_law(soils, slope.site))
     model.add_water(
         porosity={name: soil.porosity for name, soil in soils.items()},
         conductivity={name: vertical_conductivity(soil) for name, soil in soils.items()},

@@ -189,7 +189,10 @@ def test_layers_that_are_placed_in_stages_settle_the_clay_below_as_their_weights
     [
         ("day = 1.0\nfill = 'sand'", r"stages\[0\]: soil 'sand' is not among the soils clay, first, second"),
         ("day = 1.0", r"stages\[0\] has neither fill nor excavate"),
-        ("fill = 'first'", r"stages\[0\]: day is None, expected a number of days"),
+        (
+            "day = 1.0\nfill = 'first'\n[[stages]]\nfill = 'second'",
+            r"stages\[1\]: day is None, expected a number of days",
+        ),
         (
             "day = 1.0\nduration = -1\nfill = 'first'",
             r"stages\[0\]: duration is -1, expected a number of days from 0 on",

@@ -39,7 +39,11 @@ def read(text, folder):
         ("n = 1.4, ", "", "soils.core: .*missing.*'n'"),
         ("[soils.core]", "[soils.clay]", "no cell has the name 'clay'"),
         ("reservoir = 0.0", 'reservoir = "full"', "boundaries.downstream: reservoir is 'full'"),
-        ("reservoir = 0.0", "level = 0.0", "boundaries.downstream has .*expected one of head, reservoir"),
+        (
+            "reservoir = 0.0",
+            "level = 0.0",
+            "boundaries.downstream: unknown key 'level', expected some of head, reservoir",
+        ),
         ("rain = 0.0", "rain = -1.0", "rate is -1"),
         (
             "[15.0, 3.0]",

@@ -1,0 +1,117 @@
+"""The keys of site files, which all studies share: each study takes what it needs, and a key that no study knows is a mistake."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import tomllib
+
+import mpm_core as mpm
+from fenics_bridge import water
+
+from .parameters import unknown_key
+from .site_laws import law_keys
+
+DAY = 86400.0
+MM_PER_DAY = 1e-3 / DAY
+KEYS = {
+    "mesh": "a .geo or .msh file beside the site's",
+    "cell_size": "a size of cells [m]",
+    "constants": "values of other constants of the .geo file",
+    "axisymmetric": "true for a half section about the axis x = 0",
+    "air": "names of groups of the mesh that hold no soil",
+    "soils": "tables [soils.NAME] for the physical groups of the mesh",
+    "laws": "tables [laws.NAME] that stages name",
+    "classes": "the number of steps of a parameter that grows with depth",
+    "supports": "fixed or roller by boundary",
+    "boundaries": "tables [boundaries.NAME] of what the water does there",
+    "pressures": "loads by boundary [Pa]",
+    "points": "places [x, y] whose settlements are followed",
+    "stages": "tables [[stages]] of what is placed and dug away",
+}
+"""What stands at the top of a site's file, and what it is"""
+CURVES = {"van_genuchten": water.VanGenuchten, "gardner": water.Gardner, "free_surface": water.FreeSurface,
+          "tabulated": water.Tabulated}  # fmt: skip
+FLOW = ("conductivity", "dip", "porosity", "compressibility", *CURVES)
+"""Keys of a soil that describe the flow of its water"""
+UNDRAINED = ("undrained", "water_modulus", "porosity")
+"""Keys of a law whose water does not drain; where a study computes the water, laws are of effective stresses"""
+CONDITIONS: dict[str, tuple[Callable, float]] = {
+    "head": (water.Head, 1.0),
+    "reservoir": (water.Reservoir, 1.0),
+    "flux": (water.Flux, 1.0),
+    "rain": (water.Rain, MM_PER_DAY),
+}
+"""Boundary condition by its key, and what one of its units is in SI"""
+WATER = (*CONDITIONS, "seepage_face")
+"""Keys of a boundary"""
+STAGE_KEYS = (
+    "name", "day", "duration", "fill", "excavate", "boundaries", "law", "unit_weight", "pressure", "support", "release",
+    "water_level", "reset_displacement",
+)  # fmt: skip
+
+
+def read_site_table(path: Path, needed: Sequence[str] = ()) -> dict[str, Any]:
+    """The file of a site as a table, all of whose keys are known.
+
+    Args:
+        path: of the TOML file.
+        needed: keys that it must have besides mesh and soils.
+
+    Raises:
+        InputError: it cannot be read, is not TOML, has a key that no study knows or lacks one that is needed.
+    """
+    try:
+        with open(path, "rb") as file:
+            table = tomllib.load(file)
+    except OSError as error:
+        raise mpm.InputError(f"cannot read the site {path}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise mpm.InputError(f"the site {path} is not TOML: {error}") from None
+    _require_known(table, KEYS, str(path))
+    for key in ("mesh", "soils", *needed):
+        if key not in table:
+            raise mpm.InputError(f"{path} has no {key!r}, which this study needs: {KEYS[key]}")
+    for key, known in (("soils", (*FLOW, "unit_weight", *law_keys())), ("laws", law_keys()), ("boundaries", WATER)):
+        for name, given in _table_at(table, key, str(path)).items():
+            _require_known(given, known, f"{path}: {key}.{name}")
+    stages = table.get("stages", [])
+    if not isinstance(stages, list):
+        raise mpm.InputError(f"{path}: stages is {stages!r}, expected tables [[stages]]")
+    for k, stage in enumerate(stages):
+        _require_known(stage, STAGE_KEYS, f"{path}: stages[{k}]")
+        for name, given in _table_at(stage, "boundaries", f"{path}: stages[{k}]").items():
+            _require_known(given, WATER, f"{path}: stages[{k}].boundaries.{name}")
+    return table
+
+
+def _table_at(table: Mapping[str, Any], key: str, where: str) -> dict[str, Any]:
+    found = table.get(key, {})
+    if not isinstance(found, dict):
+        raise mpm.InputError(f"{where}: {key} is {found!r}, expected tables by name")
+    return found
+
+
+def _require_known(given: Any, known: Collection[str], where: str) -> None:
+    """Require that all keys of a table are known; dashes in them become underscores."""
+    if not isinstance(given, dict):
+        raise mpm.InputError(f"{where} is {given!r}, expected a table of keys and values")
+    for key in list(given):
+        given[key.replace("-", "_")] = given.pop(key)
+    for key in given:
+        if key not in known:
+            raise mpm.InputError(f"{where}: {unknown_key(key, known)}")
+
+
+def part_of(table: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:
+    """The entries of a table that have one of some keys."""
+    return {key: value for key, value in table.items() if key in keys}
+
+
+def changes_of(stages: Iterable[Mapping[str, Any]], keys: Sequence[str]) -> str:
+    """The changes by some keys that stages make, in words: "excavate of 'cut', release of 'cut'"; empty without any."""
+    named = [(stage.get("name", f"stage {k}"), stage) for k, stage in enumerate(stages, 1)]
+    given = [(key, name) for name, stage in named for key in keys if stage.get(key) not in (None, "", [], {})]
+    return ", ".join(f"{key} of {name!r}" for key, name in given)

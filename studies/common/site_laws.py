@@ -1,0 +1,78 @@
+"""The laws of the soils of a site: the table of a soil has the parameters of its law, named as the options of the study slope."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import mpm_core as mpm
+
+from .options import add_number, study_parser
+from .parameters import ParameterError, checked_values
+from .slope_case import add_soil_options
+from .soils import add_law_options, law_of
+
+
+@cache
+def _parser() -> argparse.ArgumentParser:
+    parser = study_parser(None)
+    add_soil_options(parser, dilation_angle=0.0)
+    add_law_options(parser)
+    add_number(
+        parser, "--shear-strength", None, "Pa", "undrained shear strength, for tresca: instead of cohesion", at_least=0
+    )
+    return parser
+
+
+def law_keys() -> Sequence[str]:
+    """Keys of all parameters of laws."""
+    places = ("help", "output", "overwrite", "parameters_file", "allow_code")
+    return [action.dest for action in _parser()._actions if action.dest not in places]
+
+
+def unit_weight_of(soil: dict, where: str) -> float:
+    """Unit weight [N/m3] in the table of a soil; where: it stands, for messages."""
+    if "unit_weight" not in soil:
+        raise mpm.InputError(f"{where} has no unit_weight [N/m3]")
+    if not is_number(soil["unit_weight"]) or soil["unit_weight"] < 0:
+        raise mpm.InputError(f"{where}: unit_weight is {soil['unit_weight']!r}, expected a number from 0 on [N/m3]")
+    return float(soil["unit_weight"])
+
+
+def law_at(table: dict, height: float, where: str) -> Any:
+    """The law that a table describes, where its parameters that grow with depth have their value at a height [m]."""
+    values = vars(_parser().parse_args([]))
+    try:
+        here = {key.replace("_", "-"): _at_height(key, value, height) for key, value in table.items()}
+        values |= checked_values(where, here, _parser()._actions)
+    except (ParameterError, ValueError) as error:
+        raise mpm.InputError(str(error) if isinstance(error, ParameterError) else f"{where}: {error}") from None
+    if values["shear_strength"] is not None:
+        values["cohesion"] = values["shear_strength"]
+    return law_of(argparse.Namespace(**values))
+
+
+def located(table: dict, path: Path) -> dict:
+    """The table of a law whose files are beside the site's; path: of the site's."""
+    files = {key: str(path.parent / table[key]) for key in ("umat", "python_law") if key in table}
+    return table | files
+
+
+def _at_height(name: str, value: Any, height: float) -> Any:
+    """A parameter as it is, or its value at a height: value + per_metre * (top - height)."""
+    if not isinstance(value, dict):
+        return value
+    if set(value) != {"value", "per_metre", "top"} or not all(map(is_number, value.values())):
+        raise ValueError(
+            f"{name} is {value}, expected {{value = , per_metre = , top = }}: it grows with depth below top [m]"
+        )
+    return float(value["value"] + value["per_metre"] * max(value["top"] - height, 0.0))
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value of a site's file is a finite number."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,0 +1,221 @@
+"""One file of a site serves all studies that take sites, and its mistakes are named by all of them."""
+
+import importlib
+import json
+import re
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import mpm_core as mpm
+
+ROOT = Path(__file__).parents[3]
+sys.path.insert(0, str(ROOT / "studies"))
+DIKE = ROOT / "meshes" / "dike.toml"
+SMALL = {
+    "collapse": "--meshes 1",
+    "consolidation": "--days 100 --first-step 10 --growth 2 --frames 1 --no-film",
+    "drawdown": "--days 1 --factor-times 1 --no-davis --no-pictures",
+    "embankment": "--factor 1 --time 0.01 --frames 1 --no-nmd --no-pictures",
+    "excavation": "--elements P1",
+    "rain": "--days 1 --factor-times 1 --no-davis --no-suction --no-pictures",
+    "safety": "--meshes 1",
+    "seepage": "--days 1 --frames 1 --no-film",
+    "slope": "--time 0.01 --frames 1 --no-pictures",
+}
+
+
+def run(study, path, folder, options=""):
+    words = [*SMALL[study].split(), *options.split(), "--site", str(path), "--output", str(folder)]
+    assert importlib.import_module(study).main(words) == 0, study
+    return json.loads((folder / "summary.json").read_text())
+
+
+def written(folder, *changes):
+    text = DIKE.read_text().replace('"bank_on_ground.geo"', f'"{ROOT}/meshes/bank_on_ground.geo"')
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "site.toml").write_text(text)
+    return folder / "site.toml"
+
+
+def test_studies_that_take_sites_are_all_here():
+    sources = {path.stem: path.read_text() for path in (ROOT / "studies").glob("*.py")}
+    options = "add_site_file|add_site_option|add_stage_options|add_water_slope_options"
+    assert sorted(SMALL) == sorted(name for name, text in sources.items() if re.search(options, text))
+
+
+def test_one_file_serves_all_studies(tmp_path):
+    """At the beginning the flow is at rest under 7 m of water, so that drawdown, rain and safety have the same pore pressures.
+
+    Their factors are between the last equilibrium and the failure that each of them found. Linear elements of the studies of
+    stages are the same, and so are the cells of their particles.
+    """
+    found = {study: run(study, DIKE, tmp_path / study, "--cell-size 3") for study in SMALL}
+    assert all(abs(found["seepage"][f"steady_inflow_{name}_m2_per_day"]) < 1e-9 for name in ("face", "crest"))
+    brackets = [(found["safety"]["factor_of_safety"], found["safety"]["failed_at"])]
+    for study in ("drawdown", "rain"):
+        rows = np.genfromtxt(tmp_path / study / "factors.csv", delimiter=",", names=True)
+        brackets.append((rows["factor_of_safety"][0], rows["failed_at_factor"][0]))
+    assert max(low for low, _ in brackets) < min(high for _, high in brackets)
+    stages = [found[study]["stages"] for study in ("embankment", "excavation")]
+    assert [row["stage"] for row in stages[0]] == ["in situ", "dike", "flood"]
+    for one, other in zip(*stages):
+        assert one["settlement_m"] == pytest.approx(other["settlement_m"], rel=1e-6)
+    assert found["embankment"]["stress_difference_of_particles_to_fem"] < 1e-6
+    assert found["slope"]["initial_out_of_balance_ratio"] < 1e-8
+    assert found["collapse"]["collapse_weight_factor"] > 1
+    assert found["consolidation"]["finished_run"] and found["consolidation"]["settlement_below_m"] > 0
+
+
+@pytest.mark.parametrize("study", SMALL)
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        ("[points]", "[point]", "unknown key 'point'; did you mean points"),
+        ("porosity = 0.4\n", "porousity = 0.4\n", "soils.bank: unknown key 'porousity'; did you mean porosity"),
+        ("cohesion = 10e3  #", "cohesionn = 10e3  #", "soils.bank: unknown key 'cohesionn'; did you mean .*cohesion"),
+        ("reservoir = [[", "resevoir = [[", "boundaries.face: unknown key 'resevoir'; did you mean reservoir"),
+        ("duration =", "durations =", r"stages\[1\]: unknown key 'durations'; did you mean duration"),
+        ("crest = {rain", "crest = {rian", r"stages\[0\].boundaries.crest: unknown key 'rian'"),
+        ('"bank_on_ground.geo"', '"bank.msh"', "site.toml: mesh: .*bank.msh"),
+        ("[soils.ground]", "[[soils.ground]]", "soils.ground is .*, expected a table of keys"),
+    ],
+)
+def test_a_mistake_is_named_by_every_study(study, old, new, words, tmp_path):
+    text = DIKE.read_text()
+    assert old in text
+    (tmp_path / "site.toml").write_text(text.replace(old, new))
+    with pytest.raises(mpm.InputError, match=words):
+        run(study, tmp_path / "site.toml", tmp_path / "results")
+
+
+@pytest.mark.parametrize(
+    "study, change, words",
+    [
+        ("drawdown", ("[boundaries", "[constants.boundaries"), "has no 'boundaries', which this study needs: .*what the water"),
+        ("consolidation", ("[points]", "[pressures]"), "has no 'points', which this study needs: places"),
+        ("embankment", ("[[stages]]", "[[constants.stages]]"), "has no 'stages', which this study needs"),
+        ("consolidation", ("day = 1.0\n", ""), r"stages\[1\]: day is None, expected a number of days from 0 on, when the stage begins"),
+        ("rain", ("conductivity = 3e-7  # m/s\nporosity = 0.4\ncompressibility = 5e-8  # 1/Pa, for seepage; consolidation has "
+                  "that of the law\nvan_genuchten = {alpha = 1e-4, n = 1.6, residual = 0.1, air_entry = 200.0}  # 1/Pa, -, -, Pa\n",
+                  ""), "soils.bank has no conductivity"),
+        ("safety", ("unit_weight = 20e3  # N/m3, saturated\n", ""), "soils.bank has no unit_weight"),
+        ("seepage", ("[constants]", "axisymmetric = true\n[constants]"), "axisymmetric is True, expected false"),
+    ],
+)  # fmt: skip
+def test_what_a_study_needs_is_named(study, change, words, tmp_path):
+    with pytest.raises(mpm.InputError, match=words):
+        run(study, written(tmp_path, change), tmp_path / "results")
+
+
+def test_a_soil_without_a_law_is_named(tmp_path):
+    (tmp_path / "site.toml").write_text(
+        f'mesh = "{ROOT}/meshes/layer.geo"\n[soils.clay]\nunit_weight = 18e3\nporosity = 0.5\n'
+    )
+    with pytest.raises(mpm.InputError, match="soils.clay has no law, which this study needs: material"):
+        run("safety", tmp_path / "site.toml", tmp_path / "results")
+
+
+def ground_alone(folder, first_line=""):
+    """The site without the bank and the stages."""
+    text = written(folder).read_text()
+    bank, ground, stages = (text.index(words) for words in ("[soils.bank]", "[soils.ground]", "[[stages]]"))
+    (folder / "site.toml").write_text(f"{first_line}\n{text[:bank]}{text[ground:stages]}")
+    return folder / "site.toml"
+
+
+def reads():
+    """Functions that read a site, by study."""
+    for study, module in (("safety", "site_file"), ("seepage", "water_site"), ("drawdown", "slope_site"),
+                          ("consolidation", "consolidation_site")):  # fmt: skip
+        reader = {"site_file": "read_site"}.get(module, f"read_{module}")
+        yield pytest.param(getattr(importlib.import_module(f"common.{module}"), reader), id=study)
+
+
+@pytest.mark.parametrize("read", reads())
+@pytest.mark.parametrize("declared", [False, True])
+def test_a_group_of_the_mesh_without_a_soil_is_named_unless_it_is_declared_as_air(read, declared, tmp_path):
+    path = ground_alone(tmp_path, 'air = "bank"' if declared else "")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        read(path, MPI.COMM_WORLD, 3.0)
+    named = [str(one.message) for one in said if "no soil for 'bank'" in str(one.message)]
+    assert len(named) == (not declared)
+    assert not any("'air'" in str(one.message) for one in said)
+
+
+def test_a_run_on_several_meshes_warns_once(tmp_path):
+    words = f"--site {ground_alone(tmp_path)} --cell-size 3 --meshes 2 --elements P1 --output {tmp_path}/results"
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("default")
+        importlib.import_module("safety").main(words.split())
+    for words in ("no soil for 'bank'", "the water of [boundaries] is left out"):
+        assert len([one for one in said if words in str(one.message)]) == 1
+
+
+def test_what_a_study_leaves_out_is_named(tmp_path):
+    from common.consolidation_site import read_consolidation_site
+    from common.site_file import read_site
+    from common.slope_site import read_slope_site
+
+    dry = [("water_level = 0.0", "release = 'left'"), ("water_level = 7.0\n", "")]
+    path = written(tmp_path, ("[points]", "[pressures]\ncrest = 10e3\n[points]"), *dry)
+    with pytest.warns(RuntimeWarning, match=r"the water of \[boundaries\] is left out") as said:
+        read_site(path, MPI.COMM_WORLD, 3.0)
+    assert any("the loads of [pressures] are left out" in str(one.message) for one in said)
+    with pytest.warns(
+        RuntimeWarning, match="this study leaves out release of 'in situ', boundaries of 'in situ'"
+    ) as said:
+        read_slope_site(path, MPI.COMM_WORLD, 3.0)
+    assert any("the loads of [pressures] are left out" in str(one.message) for one in said)
+    with pytest.warns(RuntimeWarning, match="this study leaves out release of 'in situ'$"):
+        read_consolidation_site(path, MPI.COMM_WORLD, 3.0)
+
+
+def test_the_beginning_is_the_same_in_all_studies_of_stages(tmp_path):
+    """A first stage without a day is the beginning; otherwise what no stage fills is there."""
+    from common.consolidation_site import read_consolidation_site
+    from common.site_file import read_site
+
+    staged = ROOT / "meshes" / "staged_embankment.toml"
+    mechanical = read_site(staged, MPI.COMM_WORLD, 2.0).stages
+    assert [list(stage.fill) for stage in mechanical] == [["clay"], *([f"layer {k}"] for k in range(1, 5))]
+    assert [stage.reset_displacement for stage in mechanical] == [False, True, False, False, False]
+    assert read_consolidation_site(staged, MPI.COMM_WORLD, 2.0).stages[0].off == tuple(
+        f"layer {k}" for k in range(1, 5)
+    )
+    dike = read_consolidation_site(DIKE, MPI.COMM_WORLD, 3.0)
+    assert [stage.off for stage in dike.stages] == [("bank",), (), ()]
+    assert [stage.boundary["face"].level for stage in dike.stages] == [0.0, 0.0, 7.0]
+    assert [stage.name for stage in read_site(DIKE, MPI.COMM_WORLD, 3.0).stages] == ["in situ", "dike", "flood"]
+
+
+def test_stiffness_that_grows_with_depth_has_its_settlement_in_consolidation(tmp_path):
+    """A layer under a wide load q settles by the integral of q / M, with M = 1.2 E for Poisson's ratio 1/4, as Terzaghi's."""
+    text = (ROOT / "meshes" / "layer.toml").read_text().replace('"layer.geo"', f'"{ROOT}/meshes/layer.geo"')
+    text = text.replace("young = 4e6", "young = {value = 2e6, per_metre = 2e6, top = 2.0}").replace("1e-9", "1e-7")
+    (tmp_path / "site.toml").write_text("classes = 400\n" + text)
+    words = f"--site {tmp_path}/site.toml --days 400 --growth 2 --frames 1 --no-film --particles --output {tmp_path}/results"
+    assert importlib.import_module("consolidation").main(words.split()) == 0
+    summary = json.loads((tmp_path / "results" / "summary.json").read_text())
+    exact = 30e3 / (1.2 * 2e6) * np.log(1 + 2.0)
+    for name in ("settlement_surface_m", "settlement_surface_particles_m"):
+        assert summary[name] == pytest.approx(exact, rel=1e-3)  # (dE / E)^2 in a cell, at most 2.5e-3, over 3
+
+
+def test_laws_are_of_effective_stresses_where_the_water_is_computed(tmp_path):
+    from common.site_file import read_site
+    from common.slope_site import read_slope_site
+
+    path = written(tmp_path, ("cohesion = 10e3  # Pa", "cohesion = 10e3\nundrained = true\nwater_modulus = 1e8"))
+    undrained = [isinstance(law, mpm.Undrained) for law in read_site(path, MPI.COMM_WORLD, 3.0).laws.values()]
+    assert undrained.count(True) == 1
+    slope = read_slope_site(path, MPI.COMM_WORLD, 3.0)
+    assert not any(isinstance(law, mpm.Undrained) for law in slope.site.laws.values())
+    assert slope.porous["bank"].porosity == 0.4
