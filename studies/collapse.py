@@ -75,8 +75,8 @@ def collapse(a: Namespace, cell_size: float, dilation_angle: float) -> bridge.Co
     """Raise the unit weight to the last equilibrium on one mesh; the first step does not depend on the result."""
     model = slope_fem(a, comm, cell_size, dilation_angle, a.depth)
     first_step = a.cohesion / a.height
-    title = f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees, unit weight [N/m3]"
-    return bridge.collapse_load(model, weight, first_step=first_step, progress=step_line(title))
+    progress = step_line(f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees", "unit weight [N/m3]")
+    return bridge.collapse_load(model, weight, first_step=first_step, progress=progress)
 
 
 def davis_unit_weight(a: Namespace) -> float:

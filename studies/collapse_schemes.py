@@ -100,7 +100,7 @@ def runs(a: Namespace, cell_size: float, longest_step: float, end: float) -> dic
         found[name] = {"curve": curve, "collapse": curve[-1, 0], "cpu_seconds": process_time() - start}
         print(f"{name:20} h {cell_size:<7g} {curve[-1, 0] / 1e3:7.3f} kN/m3", flush=True)
     name, start = f"finite elements, {a.elements}", process_time()
-    progress = step_line(f"cells of {cell_size:g} m, unit weight [N/m3]")
+    progress = step_line(f"cells of {cell_size:g} m", "unit weight [N/m3]")
     fem = bridge.collapse_load(
         slope_fem(a, comm, cell_size), weight, longest_step, tolerance=a.tolerance, progress=progress
     )

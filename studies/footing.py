@@ -116,7 +116,7 @@ def footing(a: Namespace, cell_size: float, dilation_angle: float) -> tuple[brid
     domain, _, facet_tags = bridge.read_mesh(ROOT / "meshes" / "footing.geo", comm, parameters=parameters)
     supports = [bridge.roller(AXIS, (1, 0)), bridge.roller(FAR, (1, 0)), bridge.fixed(BASE)]
     model = bridge.QuasiStatic(domain, soil_of(a, dilation_angle), facet_tags, supports, **finite_elements(a))
-    show = step_line(f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees, pressure [Pa]")
+    show = step_line(f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees", "pressure [Pa]")
     curve, centre = [(0.0, 0.0)], np.zeros((1, 2))
 
     def look(step: bridge.LoadStep) -> None:

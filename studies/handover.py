@@ -147,7 +147,7 @@ def main(arguments: list[str] | None = None) -> int:
     case = build_slope(a, comm)
     fem = soil_fem(case, averages_strains("explicit", case.model.laws))
     collapse = bridge.collapse_load(
-        fem, weight, first_step=2e3, progress=step_line("collapse, unit weight [N/m3]")
+        fem, weight, first_step=2e3, progress=step_line("collapse", "unit weight [N/m3]")
     ).value
     runs = [run(a, fraction, fraction * collapse) for fraction in FRACTIONS]
     runouts = [float(run["history"][-1, 1]) for run in runs]

@@ -93,8 +93,8 @@ def target(factor: float) -> Target:
 def safety(a: Namespace, cell_size: float, dilation_angle: float) -> bridge.Collapse:
     """Weaken the soil to the last equilibrium on one mesh."""
     model = slope_fem(a, comm, cell_size, dilation_angle, a.depth)
-    title = f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees, factor"
-    return bridge.factor_of_safety(model, weight(a.unit_weight), start=a.start, progress=step_line(title))
+    progress = step_line(f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees", "factor")
+    return bridge.factor_of_safety(model, weight(a.unit_weight), start=a.start, progress=progress)
 
 
 def averages(a: Namespace, laws: Iterable[Any]) -> bool:
@@ -117,7 +117,7 @@ def slope_by_particles(a: Namespace) -> bridge.ParticleSafety:
         return model
 
     nmd = averages(a, [soil_of(a)])
-    return bridge.particle_safety(weakened, start=a.start, nmd=nmd, progress=step_line("particles, factor"))
+    return bridge.particle_safety(weakened, start=a.start, nmd=nmd, progress=step_line("particles", "factor"))
 
 
 def site_by_particles(a: Namespace, site: Site) -> bridge.ParticleSafety:
@@ -126,7 +126,7 @@ def site_by_particles(a: Namespace, site: Site) -> bridge.ParticleSafety:
         lambda factor: site.particles(3, bridge.reduced_strength(site.laws, factor, site.tags_of(a.unreduced))),
         start=a.start,
         nmd=averages(a, site.laws.values()),
-        progress=step_line("particles, factor"),
+        progress=step_line("particles", "factor"),
     )
 
 

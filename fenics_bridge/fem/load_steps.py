@@ -21,6 +21,9 @@ _MOST_STEPS = 1000
 FAR = 1e6
 """Way in first steps beyond which a value without a bound has shown no failure"""
 
+LOADING = "part of the load"
+"""Quantity of steps that apply a load"""
+
 
 class LoadStep(NamedTuple):
     """One attempted load step."""
@@ -33,6 +36,8 @@ class LoadStep(NamedTuple):
     """Amount of the change"""
     report: EquilibriumReport
     """How the equilibrium was found, or why there is none"""
+    quantity: str = "value"
+    """What the value is: the fraction of a load that is being applied, or else what the caller changes"""
 
     def __repr__(self) -> str:
         return f"<LoadStep {self.number}: to {self.value:.6g} by {self.size:.3g}; {self.report!r}>"
@@ -50,6 +55,7 @@ def advance(
     first_step: float,
     tolerance: float,
     progress: Callable[[LoadStep], Any] | None = None,
+    quantity: str = "value",
 ) -> list[LoadStep]:
     """Increase a value from `start` towards `end` in equilibrium, until the end is reached or no further step succeeds.
 
@@ -61,6 +67,7 @@ def advance(
             equilibrium halves it. A value at which the body fails is never passed; below it values are bisected.
         tolerance: size, as a fraction of the value (or of the first step, if that is more), below which steps end.
         progress: function that is called with each load step.
+        quantity: what the value is, for the steps.
 
     Returns:
         All steps; the last converged one is the last equilibrium.
@@ -81,7 +88,7 @@ def advance(
         if size < smallest:
             break
         target = end if size >= (end - value) * (1 - 1e-12) else value + size
-        steps.append(LoadStep(len(steps) + 1, target, target - value, equilibrate(target)))
+        steps.append(LoadStep(len(steps) + 1, target, target - value, equilibrate(target), quantity))
         if progress is not None:
             progress(steps[-1])
         if steps[-1].converged:
@@ -124,7 +131,8 @@ def _below_failure(value: float, failed_at: float, carried: float) -> float:
 def print_step(step: LoadStep) -> None:
     """Print a line on a load step to standard error, from rank 0.
 
-    It gives the number of the step, the value and its change, the linear systems solved, the last residual, and the outcome.
+    It gives the number of the step, the value by its name and its change, the linear systems solved, the last residual, and the
+    outcome.
 
     Args:
         step: the load step.
@@ -136,7 +144,7 @@ def print_step(step: LoadStep) -> None:
     why = report.reason if np.isnan(report.carried) else f"the stresses carry {report.carried:.2%} of the load"
     state = {"equilibrium": "ok", "failure": f"fails: {why}"}.get(report.outcome, f"undecided ({report.reason})")
     print(
-        f"step {step.number:3d}  value {step.value:<12.6g} size {step.size:<10.3g} "
+        f"step {step.number:3d}  {step.quantity} {step.value:<12.6g} size {step.size:<10.3g} "
         f"{method} {report.iterations:2d}  residual {report.residuals[-1]:.1e}  {state}",
         file=sys.stderr,
         flush=True,
@@ -153,7 +161,13 @@ def raise_load(
     start = model.load
     _warn_of_unmoved(model, load)
     steps = advance(
-        lambda fraction: model.equilibrate(start.towards(load, fraction)), 0.0, 1.0, first_step, tolerance, progress
+        lambda fraction: model.equilibrate(start.towards(load, fraction)),
+        0.0,
+        1.0,
+        first_step,
+        tolerance,
+        progress,
+        LOADING,
     )
     model.converged = bool(steps) and steps[-1].converged and steps[-1].value == 1.0
     if not model.converged and MPI.COMM_WORLD.rank == 0:

@@ -65,7 +65,7 @@ def site_study(
     for size in sizes:
         site = site if size == sizes[0] else read_site(a.site, comm, size)
         cells = "site" if size is None else f"cells of {size:g} m"
-        progress = step_line(f"{cells}, {label[0].lower()}{label[1:]}")
+        progress = step_line(cells, label[0].lower() + label[1:])
         model = site.finite_elements(**finite_elements(a))
         runs.append(find(site, model, progress))
     if at_once:

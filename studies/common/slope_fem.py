@@ -133,12 +133,17 @@ def weight(unit_weight: float) -> bridge.Load:
     return bridge.Load(unit_weight=unit_weight)
 
 
-def step_line(title: str) -> Callable[[bridge.LoadStep], None]:
-    """A `progress` for load steps, which prints each step on the first rank."""
+def step_line(where: str, quantity: str = "") -> Callable[[bridge.LoadStep], None]:
+    """A `progress` for load steps, which prints each step on the first rank.
+
+    Args:
+        where: what is computed.
+        quantity: what the value of its steps is, but for those that apply the load.
+    """
 
     def show(step: bridge.LoadStep) -> None:
         if MPI.COMM_WORLD.rank == 0:
-            print(f"{title}: ", end="", file=sys.stderr)
+            print(f"{where}, {quantity}: " if step.quantity == "value" else f"{where}: ", end="", file=sys.stderr)
         bridge.print_step(step)
 
     return show

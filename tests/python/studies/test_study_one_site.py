@@ -219,3 +219,12 @@ def test_laws_are_of_effective_stresses_where_the_water_is_computed(tmp_path):
     slope = read_slope_site(path, MPI.COMM_WORLD, 3.0)
     assert not any(isinstance(law, mpm.Undrained) for law in slope.site.laws.values())
     assert slope.porous["bank"].porosity == 0.4
+
+
+def test_steps_that_apply_the_load_are_called_so(tmp_path, capsys):
+    run("safety", DIKE, tmp_path / "safety", "--cell-size 3")
+    lines = [line for line in capsys.readouterr().err.splitlines() if "step " in line]
+    loading = [line for line in lines if line.startswith("cells of 3 m: step") and "part of the load" in line]
+    values = [line for line in lines if line.startswith("cells of 3 m, factor of safety [-]: step")]
+    assert loading and values and len(loading) + len(values) == len(lines)
+    assert all(float(re.search(r"value (\S+)", line)[1]) > 0.5 for line in values)  # they begin above --start
