@@ -30,7 +30,7 @@ def add_site_option(parser: argparse.ArgumentParser) -> None:
 
 
 def check_site_options(parser: argparse.ArgumentParser, options: Namespace, names: set[str]) -> None:
-    """End with an error where the command line names options that a site does not have.
+    """End with an error where the command line names options that a site does not have, and leave them out of its parameters.
 
     Args:
         names: of the options that it has, without dashes, besides those of the results.
@@ -38,6 +38,8 @@ def check_site_options(parser: argparse.ArgumentParser, options: Namespace, name
     kept = {f"--{name}" for name in (*names, "cell-size", "site", "output", "overwrite", "parameters")}
     others = [name for name in sorted(options.given) if name.replace("--no-", "--") not in kept]
     check_effect(parser, options, options.site is None, others, "no --site")
+    if options.site is not None:
+        options.actions = [action for action in options.actions if kept.intersection(action.option_strings)]
 
 
 def site_study(

@@ -228,3 +228,15 @@ def test_steps_that_apply_the_load_are_called_so(tmp_path, capsys):
     values = [line for line in lines if line.startswith("cells of 3 m, factor of safety [-]: step")]
     assert loading and values and len(loading) + len(values) == len(lines)
     assert all(float(re.search(r"value (\S+)", line)[1]) > 0.5 for line in values)  # they begin above --start
+
+
+@pytest.mark.parametrize("study", ["collapse", "safety", "slope"])
+def test_parameters_of_a_run_of_a_site_have_its_options_only(study, tmp_path):
+    from common.results import open_results
+
+    options = importlib.import_module(study).parse(["--site", str(DIKE), "--output", str(tmp_path / "results")])
+    text = (open_results(options) / "parameters.toml").read_text()
+    names = set(re.findall(r"^([a-z0-9-]+) = ", text, re.MULTILINE))
+    assert "site" in names and not names & {"height", "angle", "cohesion", "unit-weight", "friction-angle", "depth"}
+    again = importlib.import_module(study).parse(["--parameters", str(tmp_path / "results" / "parameters.toml")])
+    assert again.site == DIKE and {one.name for one in again.parameters()} >= names
