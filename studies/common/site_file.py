@@ -208,10 +208,11 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
             )
             laws |= {tag: law_at(parameters, height, where) for tag, height in heights.items()}
         else:
-            law = law_at(parameters, 0.0, where)
+            law = law_at(parameters, None, where)
             laws |= dict.fromkeys(bridge.names_of(cell_tags).get(soil, (soil,)), law)
     others = {
-        name: law_at(located(given, path), 0.0, f"{path}: laws.{name}") for name, given in table.get("laws", {}).items()
+        name: law_at(located(given, path), None, f"{path}: laws.{name}")
+        for name, given in table.get("laws", {}).items()
     }
     rows = table.get("stages", [])
     site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, supports_of(table, path, domain, facet_tags), [],

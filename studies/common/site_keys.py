@@ -78,6 +78,8 @@ def read_site_table(path: Path, needed: Sequence[str] = ()) -> dict[str, Any]:
         for name, given in _table_at(table, key, str(path)).items():
             _require_known(given, known, f"{path}: {key}.{name}")
     stages = table.get("stages", [])
+    if isinstance(stages, dict):  # a single one
+        stages = table["stages"] = [stages]
     if not isinstance(stages, list):
         raise mpm.InputError(f"{path}: stages is {stages!r}, expected tables [[stages]]")
     for k, stage in enumerate(stages):

@@ -43,8 +43,14 @@ def unit_weight_of(soil: dict, where: str) -> float:
     return float(soil["unit_weight"])
 
 
-def law_at(table: dict, height: float, where: str) -> Any:
-    """The law that a table describes, where its parameters that grow with depth have their value at a height [m]."""
+def law_at(table: dict, height: float | None, where: str) -> Any:
+    """The law that a table describes, where its parameters that grow with depth have their value at a height [m].
+
+    Args:
+        table: parameters of the law.
+        height: None for a law without such parameters.
+        where: the table stands, for messages.
+    """
     values = vars(_parser().parse_args([]))
     try:
         here = {key.replace("_", "-"): _at_height(key, value, height) for key, value in table.items()}
@@ -62,10 +68,12 @@ def located(table: dict, path: Path) -> dict:
     return table | files
 
 
-def _at_height(name: str, value: Any, height: float) -> Any:
+def _at_height(name: str, value: Any, height: float | None) -> Any:
     """A parameter as it is, or its value at a height: value + per_metre * (top - height)."""
     if not isinstance(value, dict):
         return value
+    if height is None:
+        raise ValueError(f"{name} is {value}, expected one value: only parameters of [soils] grow with depth")
     if set(value) != {"value", "per_metre", "top"} or not all(map(is_number, value.values())):
         raise ValueError(
             f"{name} is {value}, expected {{value = , per_metre = , top = }}: it grows with depth below top [m]"

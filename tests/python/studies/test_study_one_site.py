@@ -190,6 +190,10 @@ def test_the_beginning_is_the_same_in_all_studies_of_stages(tmp_path):
     assert read_consolidation_site(staged, MPI.COMM_WORLD, 2.0).stages[0].off == tuple(
         f"layer {k}" for k in range(1, 5)
     )
+    single = DIKE.read_text().partition("[[stages]]")[0] + '[stages]\nday = 2.0\nfill = "bank"\n'
+    path = tmp_path / "single.toml"
+    path.write_text(single.replace('"bank_on', f'"{ROOT}/meshes/bank_on'))
+    assert [list(stage.fill) for stage in read_site(path, MPI.COMM_WORLD, 3.0).stages] == [["ground"], ["bank"]]
     dike = read_consolidation_site(DIKE, MPI.COMM_WORLD, 3.0)
     assert [stage.off for stage in dike.stages] == [("bank",), (), ()]
     assert [stage.boundary["face"].level for stage in dike.stages] == [0.0, 0.0, 7.0]

@@ -116,6 +116,8 @@ def test_a_site_may_be_a_half_section(tmp_path):
         ("cell_size = 0.5", 'cell_size = 0.5\nstages = [{water_level = "low"}]', "water_level is 'low', expected a number"),
         ("cell_size = 0.5", "cell_size = 0.5\nstages = [{water_level = [[3, 1], [0, 1]]}]", r"water_level is \[.* with x rising"),
         ("cell_size = 0.5", 'cell_size = 0.5\nstages = [{support = ["left"]}]', r"support is \['left'\], expected a table such as"),
+        ("cell_size = 0.5", "cell_size = 0.5\nlaws = {soft = {young = {value = 1e6, per_metre = 1e5, top = 2.0}}}",
+         "laws.soft: young is .* expected one value: only parameters of"),
         ("cell_size = 0.5", "cell_size = 0.5\nstages = [{unit_weight = 5e3}]", "unit_weight is 5000.0, expected a table such as"),
     ],
 )  # fmt: skip
