@@ -2,6 +2,7 @@
 
 #include "base/lanes.h"
 #include "model/anisotropy.h"
+#include "model/integration.h"
 #include "model/mapping.h"
 #include "model/material_points.h"
 #include "parallel/agreement.h"
@@ -290,9 +291,9 @@ double outflow(const Mesh<G::dim>& mesh, const WaterField<G>& field, Index cell,
 template <class G>
 void average_outflow(const Mesh<G::dim>& mesh, NodeExchange& exchange, double dt, WaterField<G>& field)
 {
-  // by the volumes of the particles, so that no water is lost or made
-  const auto volume_of = [&](Index c)
-  { return averaged_strain_fraction(field.motion.integration, c) * field.motion.moments[c].volume; };
+  // By the volumes over which pressures are integrated, as their averages are: the transpose of these, so that water is
+  // at rest where they balance its weight.
+  const auto volume_of = [&](Index c) { return averaged_strain_volume(mesh, field.motion, c); };
   const auto outflow_of = [&](Index c, double volume) { return volume * outflow(mesh, field, c, dt); };
   average_over_nodes(mesh, field.motion.part, volume_of, outflow_of, exchange, field.motion.volumetric_strain);
 }

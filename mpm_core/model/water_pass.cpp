@@ -60,6 +60,16 @@ WaterChange<D> water_change(const Mesh<D>& mesh, const VelocityField<G>& soil, c
           affine_field<D>(mesh, cell, change)};
 }
 
+/// sum V
+template <int D>
+double volume_sum(const Particles<D>& particles, const Run& run)
+{
+  Lanes sum{};
+  add_lanes(std::array<const double*, 1>{particles.volume.data()}, run.first, run.last,
+            [&sum](const Piece<1>& piece, const LaneMask& mine) { sum += mine ? piece[0] : Lanes{}; });
+  return base::sum(sum);
+}
+
 /// sum V p
 template <int D>
 double pressure_sum(const Particles<D>& particles, const Run& run)
@@ -175,6 +185,7 @@ std::array<double, 2> water_pass(Model<G>& model, double dt, double flip_fractio
         water_change(model.mesh, model.fields.front(), model.water_field, run.cell, model.water->modulus, dt, nmd);
     const double half_strain = 0.5 * (change.growth + change.outflow / density);
     work[0] -= half_strain * pressure_sum(particles, run);
+    model.water->inflow -= change.outflow * volume_sum(particles, run) / density;
     if (run.resting)
       change_gradient<D>(particles, run.first, flip_fraction, change);
     else if (flip_fraction < 1)
@@ -188,10 +199,6 @@ std::array<double, 2> water_pass(Model<G>& model, double dt, double flip_fractio
   };
   std::ranges::for_each(model.order.runs, change_run);
   std::ranges::for_each(model.fields.front().resting.runs, change_run);
-  for (Index c : model.water_field.motion.part.cells)
-    if (model.water_field.motion.moments[c].volume > 0)
-      model.water->inflow -=
-          model.water_field.motion.moments[c].volume * outflow(model.mesh, model.water_field, c, dt) / density;
   return work;
 }
 

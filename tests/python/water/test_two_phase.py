@@ -383,6 +383,26 @@ def test_water_rests_between_particles_that_are_not_spread_evenly(nmd):
     assert p == pytest.approx(GAMMA * (1 - height), abs=0.03 * GAMMA)
 
 
+def test_averaged_pressures_balance_the_weight_of_water_among_uneven_triangles():
+    """A square grid, whose particles on diagonals belong to one of two triangles, which have 6 and 10. Pressures and flow are
+    averaged by the same volumes: otherwise pressures rise by 0.04 m of head everywhere, and water flows without end."""
+    model = mpm.Model(box([8, 16], [0.4, 0.8], diagonals="alternating"), mpm.LinearElastic(young=5e6, poisson=0.3))
+    points = 0.0125 * (np.indices((32, 46)).reshape(2, -1).T + 0.5)
+    model.seed_points(points, np.full(len(points), 0.0125**2), density=DENSITY)
+    for side, normal in ((LEFT, (1, 0)), (RIGHT, (1, 0)), (BASE, (0, 1))):
+        model.roller(side, normal)
+    model.set_gravity((0.0, -9.81))
+    model.add_water(porosity=POROSITY, conductivity=1e-3, modulus=2e7, suction_limit=0.0)
+    model.set_pore_pressure(lambda x: GAMMA * (0.575 - x[:, 1]))
+    vertical = (DENSITY / WATER - 1) * GAMMA * (points[:, 1:] - 0.575)
+    model.particles.set("stress", vertical * [3 / 7, 1.0, 3 / 7, 0.0])
+    model.explicit(1.0, nmd=True, damping=0.3, energy_limit=None).last()  # hardly any energy is at work
+    height = np.asarray(model.mesh.points)[model.mesh.cells[model.particles.cell], 1].mean(axis=1)
+    inner = (height > 0.1) & (height < 0.5)
+    p = model.averaged_pore_pressure()[inner]
+    assert p == pytest.approx(GAMMA * (0.575 - height[inner]), abs=0.02 * GAMMA)
+
+
 @pytest.mark.parametrize("evenly", [True, False])
 @pytest.mark.parametrize("suction_limit", [np.inf, 0.0])
 def test_water_that_stands_over_a_slope_carries_soil_as_heavy_as_itself(suction_limit, evenly):
