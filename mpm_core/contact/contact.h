@@ -114,8 +114,10 @@ struct WaterBeside
 {
   /// Fraction of the normal stress on the surface that the water of a cell carries, at most 1; it causes no friction
   std::function<double(Index cell, const Vector<D>& normal)> fraction;
-  std::span<Vector<D>> forces;  ///< what of the forces acts on the water, at the nodes; added to [N]
-  std::span<Vector<D>> normals; ///< the normal forces on soil and water; likewise
+  std::span<Vector<D>> forces; ///< what of the forces acts on the water, at the nodes; added to [N]
+  /// Area of the surface that particles cover which it touches, or is no farther from than their radius, times its
+  /// normal, at the nodes; added to [m2]
+  std::span<Vector<D>> facing;
 };
 
 /// Adds the forces on particles to their nodes, and to what the surface feels.

@@ -100,6 +100,7 @@ struct ParticleForce
   Vector<D> force;
   Vector<D> normal;      ///< the part of it along the normal of the surface
   double water_fraction; ///< of that part
+  Vector<D> facing;      ///< the area of the surface that it covers, times the normal [m2]
 };
 
 /// Force on a particle that is tied to the surface, by all of its motion relative to the body.
@@ -126,13 +127,16 @@ std::optional<ParticleForce<D>> bond_force(const Press<D>& press, const Distance
   reaction.sticking += area;
   reaction.normal += dot<D>(force, touch.normal);
   react<D>(force, arm, reaction);
-  ParticleForce<D> found{force, touch.normal, 0};
+  ParticleForce<D> found{force, touch.normal, 0, touch.normal};
   for (double& component : found.normal)
     component *= dot<D>(force, touch.normal);
+  for (double& component : found.facing)
+    component *= area;
   return found;
 }
 
-/// Force on a particle, whose velocity is that of the nodes at its place; takes its slip along. None without contact.
+/// Force on a particle, whose velocity is that of the nodes at its place; takes its slip along. None without contact,
+/// but beside water that moves by itself none only where the surface is farther than the particle's radius.
 template <class G, int D = G::dim>
 std::optional<ParticleForce<D>> particle_force(const Press<D>& press, const Distance<D>& nearest,
                                                const Vector<D>& velocity, const Particles<D>& particles, Index p,
@@ -155,12 +159,15 @@ std::optional<ParticleForce<D>> particle_force(const Press<D>& press, const Dist
   if (overlap > 0)
     reaction.energy += 0.5 * stiffness * (overlap * overlap);
   reaction.energy += 0.5 * stiffness * dot<D>(slip, slip);
+  const double area = particle_area<G>(particles, p, radius, touch.normal[0]);
+  ParticleForce<D> found{{}, {}, 0, touch.normal};
+  for (double& component : found.facing)
+    component *= area;
   if (!(depth > 0))
   {
     leave_slip<D>(press, p);
-    return std::nullopt;
+    return water ? std::optional(found) : std::nullopt;
   }
-  const double area = particle_area<G>(particles, p, radius, touch.normal[0]);
   reaction.area += area;
   reaction.mass += mass;
   reaction.normal += stiffness * depth;
@@ -172,7 +179,7 @@ std::optional<ParticleForce<D>> particle_force(const Press<D>& press, const Dist
     for (std::size_t i = 0; i < D; ++i)
       (*press.slips)[i][p] = slip[i];
   }
-  ParticleForce<D> found{{}, {}, share.fraction};
+  found.water_fraction = share.fraction;
   for (int i = 0; i < D; ++i)
   {
     found.normal[i] = stiffness * depth * touch.normal[i];
@@ -253,7 +260,7 @@ struct RunForces
 {
   TractionMoments<D> all{};
   TractionMoments<D> on_water{}; ///< the part that water which moves by itself carries
-  TractionMoments<D> normal{};   ///< of all of them, with such water
+  TractionMoments<D> facing{};   ///< of the areas that the particles cover, with such water
 };
 
 /// Adds a fraction of a force.
@@ -315,7 +322,7 @@ bool press_run(const Mesh<D>& mesh, const Run& run, std::span<const Vector<D>> v
     if (!water)
       continue;
     add_force<D>(found->water_fraction, found->normal, xi, forces.on_water);
-    add_force<D>(1, found->normal, xi, forces.normal);
+    add_force<D>(1, found->facing, xi, forces.facing);
   }
   return touched;
 }
@@ -352,7 +359,7 @@ bool add_contact_forces(const Mesh<D>& mesh, const std::vector<Run>& runs, const
     if (!water)
       continue;
     add_to_nodes<D>(mesh, cell, found.on_water, water->forces);
-    add_to_nodes<D>(mesh, cell, found.normal, water->normals);
+    add_to_nodes<D>(mesh, cell, found.facing, water->facing);
   }
   return touched;
 }

@@ -59,7 +59,7 @@ struct WaterField
   std::vector<unsigned char> supplied; ///< per node: 1 where water may enter the soil
   std::vector<ImperviousNode<D>> impervious; ///< at facets of the mesh; by rising node
   std::vector<ImperviousNode<D>> closed;     ///< these, and those at rigid surfaces in this step
-  std::vector<Vector<D>> pressed;            ///< scratch: normal forces of rigid surfaces at the nodes [N]
+  std::vector<Vector<D>> covered;            ///< scratch: areas of rigid surfaces at the nodes, times normals [m2]
   std::vector<Vector<D>> flux;               ///< j_i = m_w,i / V_i (w_i - v_i) [kg/(m2 s)]
 };
 } // namespace mpm::model

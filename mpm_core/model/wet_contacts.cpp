@@ -34,20 +34,20 @@ double water_fraction(const Model<G>& model, Index cell, const Vector<D>& normal
 template <int D>
 using Closed = std::map<Index, ImperviousNode<D>>;
 
-/// Adds the normals of the nodes at the surface of the soil that a rigid surface presses.
-/// @param normals  normal forces at the nodes, which this sets to zero [N]
+/// Adds the normals of the nodes at the surface of the soil that a rigid surface covers.
+/// @param facing  see `contact::WaterBeside`; this sets it to zero
 template <class G, int D = G::dim>
-void close_pressed(const WaterField<G>& water, const std::vector<Index>& filled, std::vector<Vector<D>>& normals,
+void close_covered(const WaterField<G>& water, const std::vector<Index>& filled, std::vector<Vector<D>>& facing,
                    Closed<D>& closed)
 {
   for (Index i : filled)
   {
-    Vector<D> normal = std::exchange(normals[i], {});
-    const double force = norm<D>(normal);
-    if (force == 0 || !is_at_surface<D>(water.nodes[i]))
+    Vector<D> normal = std::exchange(facing[i], {});
+    const double area = norm<D>(normal);
+    if (area == 0 || !is_at_surface<D>(water.nodes[i]))
       continue;
     for (double& component : normal)
-      component /= force;
+      component /= area;
     ImperviousNode<D>& node = closed[i];
     node.node = i;
     add_direction<D>(normal, node);
@@ -65,9 +65,9 @@ void add_wet_contact_forces(Model<G>& model, double dt)
   WaterField<G>& water = model.water_field;
   const auto fraction = [&](Index cell, const Vector<D>& normal) { return water_fraction<G, D>(model, cell, normal); };
   const Movers movers{model.field_of_law, 0};
-  for (auto* forces : {&soil.contact_force, &water.motion.contact_force, &water.pressed})
+  for (auto* forces : {&soil.contact_force, &water.motion.contact_force, &water.covered})
     forces->resize(soil.nodes.size());
-  const WaterBeside<D> beside{fraction, water.motion.contact_force, water.pressed};
+  const WaterBeside<D> beside{fraction, water.motion.contact_force, water.covered};
   Closed<D> closed;
   for (const ImperviousNode<D>& node : water.impervious)
     closed[node.node] = node;
@@ -75,8 +75,8 @@ void add_wet_contact_forces(Model<G>& model, double dt)
   {
     add_contact_forces<G, D>(model.mesh, model.order.runs, movers, soil.start_velocity, dt, model.particles, contact,
                              soil.contact_force, &beside);
-    sum_shared(model.exchange, water.pressed);
-    close_pressed<G, D>(water, soil.part.nodes, water.pressed, closed);
+    sum_shared(model.exchange, water.covered);
+    close_covered<G, D>(water, soil.part.nodes, water.covered, closed);
   }
   water.closed.clear();
   for (const auto& [node, impervious] : closed)

@@ -13,7 +13,7 @@ namespace mpm::model
 {
 /// Adds the forces of all contacts to the tractions at the nodes, over all ranks: the whole of them to those of the
 /// soil, and what the water carries to those of the water (see `find_phase_accelerations`). Closes the nodes of the
-/// soil's surface that rigid surfaces press, along their normals.
+/// soil's surface that rigid surfaces cover, along their normals: also between particles that touch them.
 /// @pre sums and start velocities of the nodes are there
 /// @note Collective where there are contacts
 template <class G>

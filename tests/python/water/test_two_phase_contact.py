@@ -40,8 +40,8 @@ def under(model, pressure, effective):
 def test_a_column_on_a_plane_consolidates_as_terzaghi_has_it(cut, nmd):
     """On a plane that follows the mesh or cuts its cells, whose force is the total stress. Without a plane the water that has
     left is 2.7 and 1.3 % too little, since pressures are uniform in the cells at the drained surface."""
-    load, modulus, conductivity, size = 10e3, 2.2e7, 2e-4, 0.05
-    model, plane = column([2, 20], size, cut * size, 1.0)
+    load, modulus, conductivity, size = 10e3, 2.2e7, 2e-4, 1 / 24
+    model, plane = column([2, 24], size, cut * size, 1.0)
     model.add_water(porosity=POROSITY, conductivity=conductivity, modulus=modulus)
     model.traction(TOP, (0.0, -load))
     first = load / (1 + OEDOMETER * POROSITY / modulus)
@@ -68,6 +68,26 @@ def test_a_surface_rubs_by_the_effective_stress(base, nmd, conductivity):
     normal, shear = -plane.force[1] / 0.4, -plane.force[0] / 0.4
     assert normal == pytest.approx(DENSITY * GAMMA / WATER, rel=5e-3)
     assert normal - shear / MU == pytest.approx(GAMMA, rel=0.1)
+
+
+@pytest.mark.parametrize("nmd", [False, True])
+def test_no_water_leaves_at_a_surface_that_few_particles_touch(nmd):
+    """Particles at random distances from a plane, of which the first ones carry the soil: between them the water rests, too."""
+    model = mpm.Model(box([8, 14], [0.4, 0.7], diagonals="alternating"), ELASTIC)
+    squares = np.indices((32, 46)).reshape(2, -1).T
+    points = 0.0125 * (squares + np.random.default_rng(1).uniform(0.1, 0.9, squares.shape)) + (0, 0.006)
+    model.seed_points(points, np.full(len(points), 0.0125**2), density=DENSITY)
+    for side in (LEFT, RIGHT):
+        model.roller(side, (1, 0))
+    model.add_contact(mpm.Plane((0, 0.006 - 0.005 - 1e-9), normal=(0, 1)))
+    model.add_water(porosity=POROSITY, conductivity=1e-3, modulus=2e7, suction_limit=0.0)
+    model.set_gravity((0.0, -GAMMA / WATER))
+    under(model, lambda y: GAMMA * (0.581 - y), lambda y: (DENSITY / WATER - 1) * GAMMA * (0.581 - y))
+    model.explicit(0.5, nmd=nmd, damping=0.3).last()
+    p = model.averaged_pore_pressure() if nmd else model.particles.pore_pressure
+    height = np.asarray(model.mesh.points)[model.mesh.cells[model.particles.cell], 1].mean(axis=1)
+    inner = (height > 0.1) & (height < 0.5)
+    assert p[inner] == pytest.approx(GAMMA * (0.581 - height[inner]), abs=0.075 * GAMMA)
 
 
 def test_liquefied_soil_slides_without_friction():
