@@ -38,15 +38,6 @@ inline Vector<G::dim> mobility(const VelocityField<G>& field, Index node, Vector
   return direction;
 }
 
-template <int D>
-inline Vector<D> difference(const Vector<D>& a, const Vector<D>& b)
-{
-  Vector<D> result;
-  for (int i = 0; i < D; ++i)
-    result[i] = a[i] - b[i];
-  return result;
-}
-
 /// a + factor b
 template <int D>
 inline Vector<D> sum(const Vector<D>& a, double factor, const Vector<D>& b)
