@@ -36,6 +36,13 @@ double spread_fraction(const WaterField<G>& water, const CellShape<D>& shape, In
   return -std::expm1(-dt * pi * pi * modulus * pores.pores / (pores.drag * h * h));
 }
 
+/// Mass that leaves a unit of volume of a cell [kg/m3].
+template <class G>
+double outflow_of_cell(const Mesh<G::dim>& mesh, const WaterField<G>& water, Index cell, double dt, bool nmd)
+{
+  return nmd ? averaged_outflow(mesh, water, cell, dt) : outflow(mesh, water, cell, dt);
+}
+
 template <class G, int D = G::dim>
 WaterChange<D> water_change(const Mesh<D>& mesh, const VelocityField<G>& soil, const WaterField<G>& water, Index cell,
                             double modulus, double dt, bool nmd)
@@ -53,21 +60,11 @@ WaterChange<D> water_change(const Mesh<D>& mesh, const VelocityField<G>& soil, c
   for (int a = 0; a < D; ++a)
     exchange[a] = spread * (moments.momentum[a] - content * pores.pore_velocity[a]) / moments.mass;
   return {nmd ? averaged_strain(mesh, soil, cell, dt * divergence) : dt * divergence,
-          nmd ? averaged_outflow(mesh, water, cell, dt) : outflow(mesh, water, cell, dt),
+          outflow_of_cell(mesh, water, cell, dt, nmd),
           spread,
           content,
           exchange,
           affine_field<D>(mesh, cell, change)};
-}
-
-/// sum V
-template <int D>
-double volume_sum(const Particles<D>& particles, const Run& run)
-{
-  Lanes sum{};
-  add_lanes(std::array<const double*, 1>{particles.volume.data()}, run.first, run.last,
-            [&sum](const Piece<1>& piece, const LaneMask& mine) { sum += mine ? piece[0] : Lanes{}; });
-  return base::sum(sum);
 }
 
 /// sum V p
@@ -185,7 +182,6 @@ std::array<double, 2> water_pass(Model<G>& model, double dt, double flip_fractio
         water_change(model.mesh, model.fields.front(), model.water_field, run.cell, model.water->modulus, dt, nmd);
     const double half_strain = 0.5 * (change.growth + change.outflow / density);
     work[0] -= half_strain * pressure_sum(particles, run);
-    model.water->inflow -= change.outflow * volume_sum(particles, run) / density;
     if (run.resting)
       change_gradient<D>(particles, run.first, flip_fraction, change);
     else if (flip_fraction < 1)
@@ -199,6 +195,10 @@ std::array<double, 2> water_pass(Model<G>& model, double dt, double flip_fractio
   };
   std::ranges::for_each(model.order.runs, change_run);
   std::ranges::for_each(model.fields.front().resting.runs, change_run);
+  for (Index c : model.water_field.motion.part.cells)
+    if (model.water_field.motion.moments[c].volume > 0)
+      model.water->inflow -= model.water_field.motion.moments[c].volume *
+                             outflow_of_cell(model.mesh, model.water_field, c, dt, nmd) / density;
   return work;
 }
 
