@@ -19,7 +19,7 @@ def reduced_strength(law: Laws, factor: float, unreduced: Collection[int | str] 
       friction angle: associated flow stays associated.
     - SofteningMohrCoulomb: peak and residual strength alike.
     - DruckerPrager: strength and slope of the cone.
-    - CamClay and NorSand: the friction angle of the critical state, sin(phi) = 3M / (6 + M); attraction as it is.
+    - CamClay, NorSand and Sanisand: the friction angle of the critical state, sin(phi) = 3M / (6 + M); attraction as it is.
     - ViscoplasticMohrCoulomb: the strength in the limit of slow loading; the viscosity stays.
     - Heterogeneous: the strength of all points.
     - Hencky and Undrained: the law that they are made of.

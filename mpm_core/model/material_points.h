@@ -56,7 +56,8 @@ template <int D>
 double limiting_modulus_of_particle(const Law& law, const Particles<D>& particles, Index p)
 {
   return with_stress_and_state(law, particles, p,
-                               [&](double, std::span<const double> state) { return limiting_modulus(law, state); });
+                               [&](double mean_stress, std::span<const double> state)
+                               { return limiting_modulus(law, mean_stress, state); });
 }
 
 /// Means of the moduli of the points of a run, by their volumes [Pa]

@@ -49,6 +49,33 @@ surface. Without the softening by rotation of principal stresses and by unloadin
 
 Source: Jefferies (1993), Geotechnique 43, 91-103; Jefferies, Been (2016), Soil Liquefaction, 2nd ed.; g is that of van
 Eekelen (1980), Int. J. Numer. Anal. Methods Geomech. 4, 89-101, and Sheng, Sloan, Yu (2000), Comput. Mech. 26, 185-196.)");
+  bind_law<Sanisand>(
+      m, "Sanisand", "SANISAND: a bounding surface law for sand under monotonic and cyclic loading, loose and dense.",
+      R"(With p = attraction - mean stress, r = s / p, void ratio e and the atmospheric pressure p_at = 101.325 kPa:
+
+- elasticity: G = rigidity p_at (2.97 - e)^2 / (1 + e) sqrt(p / p_at), and a constant Poisson's ratio;
+- critical state: q = g M p and e_c(p) = critical_void_ratio - critical_compression (p / p_at)^critical_exponent, with
+  g = 2 c / (1 + c - (1 - c) cos(3 theta)) and c = extension_ratio; psi = e - e_c(p);
+- yield surface: a narrow cone, abs(r - alpha) = sqrt(2/3) yield_size, along n = (r - alpha) / abs(r - alpha);
+- bounding surface g M exp(-bounding_exponent psi) and dilatancy surface g M exp(dilatancy_exponent psi), in q / p;
+- hardening: in proportion to the distance from the bounding surface and to
+  rigidity hardening (1 - hardening_void_ratio e) / sqrt(p / p_at) over the distance from the last reversal of loading;
+- dilatancy: dilatancy (1 + <z : n>) times the distance from the dilatancy surface; the fabric z develops by
+  fabric_rate (fabric_limit n + z) with plastic dilation and makes sand contract after its next reversal.
+
+The state variable log_specific_volume is the logarithm of 1 + e over its initial value; the others are the back stress
+ratio alpha, alpha at the last reversal, and z, as deviators positive in tension; sanisand_state gives them for points
+that begin with a stress and a state parameter. Soil that has never been loaded begins with the ratio of its stress.
+Soil keeps a pressure of 10 Pa however loose, and the stiffness of the void ratio 2 beyond it. The law is integrated in
+substeps with an error of 1e-5, so that large and small increments give the same. The time step follows from the
+stiffness at largest_pressure, or at twice the present pressure where that is more.
+
+Parameters of Toyoura sand: rigidity 125, poisson 0.05, critical_slope 1.25, extension_ratio 0.712, critical_void_ratio
+0.934, critical_compression 0.019, critical_exponent 0.7, hardening 7.05, hardening_void_ratio 0.968, bounding_exponent
+1.1, dilatancy 0.704, dilatancy_exponent 3.5, fabric_limit 4, fabric_rate 600.
+
+Source: Dafalias, Manzari (2004), J. Eng. Mech. 130, 622-634.)")
+      .attr("atmospheric_pressure") = Sanisand::atmospheric_pressure;
 }
 
 void bind_softening(py::module_& m)

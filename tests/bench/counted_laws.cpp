@@ -42,6 +42,25 @@ Law law_of(std::string_view name, bool yields)
     return CamClay{0.2, 0.04, 1.2, 0.2, largest_pressure, 1.0, 1e3};
   if (name == "NorSand")
     return NorSand{1.0, 0.03, 1.25, 4, 100, 200, 0.2, largest_pressure, 0.9, 0.2, 1e3};
+  if (name == "Sanisand")
+    return Sanisand{125,
+                    0.05,
+                    1.25,
+                    0.712,
+                    0.934,
+                    0.019,
+                    0.7,
+                    7.05,
+                    0.968,
+                    1.1,
+                    0.704,
+                    3.5,
+                    4,
+                    600,
+                    0.8,
+                    largest_pressure,
+                    yields ? 0.01 : 0.5,
+                    1e3};
   std::fprintf(stderr, "unknown law %s\n", name.data());
   std::exit(1);
 }

@@ -10,6 +10,7 @@ namespace
 double fraction(const LinearElastic&) { return 1; }
 double fraction(const CamClay&) { return 1; }
 double fraction(const NorSand&) { return 1; }
+double fraction(const Sanisand&) { return 1; }
 double fraction(const ExternalLaw& law) { return law.association; }
 
 double fraction(const Umat& law)

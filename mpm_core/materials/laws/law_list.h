@@ -9,6 +9,7 @@
 #include "materials/laws/linear_elastic.h"
 #include "materials/laws/mohr_coulomb.h"
 #include "materials/laws/nor_sand.h"
+#include "materials/laws/sanisand.h"
 #include "materials/laws/softening_mohr_coulomb.h"
 #include "materials/laws/umat.h"
 #include "materials/laws/viscoplastic_mohr_coulomb.h"
@@ -21,7 +22,7 @@ namespace mpm::materials
 /// One of the laws that stand for themselves, or one of `Wrapper`, laws that are made of another one
 template <class... Wrapper>
 using LawList = std::variant<LinearElastic, MohrCoulomb, ViscoplasticMohrCoulomb, SofteningMohrCoulomb, DruckerPrager,
-                             CamClay, NorSand, ExternalLaw, Umat, Wrapper...>;
+                             CamClay, NorSand, Sanisand, ExternalLaw, Umat, Wrapper...>;
 
 /// Throws InputError, with name, value and range, when a parameter of a law is out of its range.
 template <class L>

@@ -18,6 +18,12 @@ double bulk_per_pressure(const CamClay& law, double log_volume)
   return (1 + law.void_ratio) * std::exp(log_volume) / law.swelling;
 }
 
+WaveModuli moduli_of_sand(const Sanisand& law, double pressure, double log_volume)
+{
+  const double shear = shear_modulus(law, pressure, (1 + law.void_ratio) * std::exp(log_volume) - 1);
+  return {(bulk_per_shear(law) + 4.0 / 3) * shear, shear};
+}
+
 LawList<> own_law(const Heterogeneous& law, std::span<const double> state)
 {
   const auto first = state.begin() + n_state(law.law);
@@ -33,6 +39,7 @@ struct DiffersByPoint
   }
   bool operator()(const CamClay&) const { return true; }
   bool operator()(const NorSand&) const { return true; }
+  bool operator()(const Sanisand&) const { return true; }
   bool operator()(const Heterogeneous& law) const
   {
     const auto is_elastic = [](const std::string& name)
@@ -64,6 +71,10 @@ struct ModuliOfPoint
     const double least = 1e-6 * (law.reference_pressure + law.attraction); // which its points keep
     return moduli_of_bulk(bulk_per_pressure(law) * std::max(law.attraction - mean_stress, least), law.poisson);
   }
+  WaveModuli operator()(const Sanisand& law) const
+  {
+    return moduli_of_sand(law, law.attraction - mean_stress, state[1]);
+  }
   WaveModuli operator()(const Heterogeneous& law) const { return std::visit(*this, own_law(law, state)); }
   WaveModuli operator()(const Hencky& law) const
   {
@@ -81,6 +92,7 @@ struct ModuliOfPoint
 
 struct LimitingModulus
 {
+  double mean_stress;
   std::span<const double> state;
 
   template <class L>
@@ -100,11 +112,17 @@ struct LimitingModulus
     now.image_pressure = (law.image_pressure + law.attraction) * std::exp(state[1]) - law.attraction;
     return p_wave_modulus(now);
   }
+  double operator()(const Sanisand& law) const
+  {
+    const double pressure = std::max(2 * (law.attraction - mean_stress), law.largest_pressure + law.attraction);
+    return moduli_of_sand(law, pressure, state[1]).p_wave;
+  }
   double operator()(const Heterogeneous& law) const { return std::visit(*this, law.law); }
   double operator()(const Hencky& law) const { return std::visit(*this, law.law); }
   double operator()(const Undrained& law) const
   {
-    return std::visit(*this, law.skeleton) + law.water_modulus / law.porosity;
+    const double excess = state[static_cast<std::size_t>(n_state(law.skeleton))];
+    return std::visit(LimitingModulus{mean_stress + excess, state}, law.skeleton) + law.water_modulus / law.porosity;
   }
 };
 } // namespace
@@ -116,8 +134,8 @@ WaveModuli moduli_of_point(const Law& law, double mean_stress, std::span<const d
   return std::visit(ModuliOfPoint{mean_stress, state}, law);
 }
 
-double limiting_modulus(const Law& law, std::span<const double> state)
+double limiting_modulus(const Law& law, double mean_stress, std::span<const double> state)
 {
-  return std::visit(LimitingModulus{state}, law);
+  return std::visit(LimitingModulus{mean_stress, state}, law);
 }
 } // namespace mpm::materials

@@ -2,6 +2,7 @@
 
 #include "materials/tools/elasticity.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -71,6 +72,19 @@ template <int D>
 double energy(const NorSand& law, const SymTensor<D>& stress, const double*)
 {
   return energy_by_pressure<D>(bulk_per_pressure(law), law.poisson, law.attraction, stress);
+}
+
+/// With moduli in proportion to the root of the pressure, and the present void ratio
+template <int D>
+double energy(const Sanisand& law, const SymTensor<D>& stress, const double* state)
+{
+  const auto [mean, squared] = invariants<D>(stress);
+  const double pressure = law.attraction - mean, start = law.attraction;
+  const double shear = shear_modulus(law, pressure, (1 + law.void_ratio) * std::exp(state[1]) - 1);
+  const double root = std::sqrt(std::max(pressure, Sanisand::least_pressure)),
+               bulk_per_root = bulk_per_shear(law) * shear / root;
+  const double volumetric = 2.0 / 3 * root * root * root - 2 * start * root + 4.0 / 3 * start * std::sqrt(start);
+  return volumetric / bulk_per_root + squared / (4 * shear);
 }
 
 template <int D>

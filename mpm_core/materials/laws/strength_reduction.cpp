@@ -162,4 +162,11 @@ NorSand reduced_strength(const NorSand& law, double factor)
   reduced.critical_slope = divided_slope(law.critical_slope, factor);
   return reduced;
 }
+
+Sanisand reduced_strength(const Sanisand& law, double factor)
+{
+  Sanisand reduced = law;
+  reduced.critical_slope = divided_slope(law.critical_slope, factor);
+  return reduced;
+}
 } // namespace mpm::materials

@@ -18,6 +18,7 @@ DruckerPrager reduced_strength(const DruckerPrager& law, double factor);
 /// The friction angle of the critical state, sin(phi) = 3M / (6 + M); attraction as it is
 CamClay reduced_strength(const CamClay& law, double factor);
 NorSand reduced_strength(const NorSand& law, double factor);
+Sanisand reduced_strength(const Sanisand& law, double factor);
 
 /// Reduces the parameters that the law names.
 /// @throws InputError it names none

@@ -1,8 +1,8 @@
 #include "materials/laws/umat.h"
 
-#include "base/tensor.h"
 #include "materials/tools/elasticity.h"
 #include "materials/tools/require.h"
+#include "materials/tools/rotation.h"
 
 #include <algorithm>
 #include <cmath>
@@ -68,11 +68,7 @@ std::array<double, 9> transposed(const std::array<double, 9>& a)
 /// Rotation of the material in an increment, by which stresses have been turned already
 std::array<double, 9> rotation_of(const std::array<double, 9>& f)
 {
-  Matrix<3> half_spin;
-  for (std::size_t i = 0; i < 3; ++i)
-    for (std::size_t j = 0; j < 3; ++j)
-      half_spin[i][j] = 0.25 * (f[3 * i + j] - f[3 * j + i]);
-  const Matrix<3> rotation = cayley_rotation<3>(half_spin);
+  const Matrix<3> rotation = materials::rotation_of<3>({{{f[0], f[1], f[2]}, {f[3], f[4], f[5]}, {f[6], f[7], f[8]}}});
   std::array<double, 9> rows;
   for (std::size_t k = 0; k < 9; ++k)
     rows[k] = rotation[k / 3][k % 3];

@@ -20,6 +20,7 @@ from ._core import (
     PythonLaw,
     RelaxationKind,
     RunError,
+    Sanisand,
     Softening,
     SofteningMohrCoulomb,
     StressUpdate,
@@ -39,7 +40,7 @@ from .field_contact import FieldContact
 from .ghost import GhostPenalty
 from .integration import default_integration
 from .law_parameters import signature_of
-from .laws import log_preconsolidation, matched_drucker_prager, nor_sand_state, tresca, von_mises
+from .laws import log_preconsolidation, matched_drucker_prager, nor_sand_state, sanisand_state, tresca, von_mises
 from .mesh import Mesh
 from .model import Model
 from .motion import Motion, motion_of_acceleration, read_acceleration, read_accelerogram
@@ -101,6 +102,7 @@ __all__ = [
     "Reports",
     "RigidContact",
     "RunError",
+    "Sanisand",
     "Servo",
     "Softening",
     "SofteningMohrCoulomb",
@@ -125,6 +127,7 @@ __all__ = [
     "parts",
     "read_acceleration",
     "read_accelerogram",
+    "sanisand_state",
     "space",
     "tresca",
     "von_mises",

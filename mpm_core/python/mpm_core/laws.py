@@ -3,7 +3,17 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._core import CamClay, ConeMatch, DruckerPrager, InputError, MohrCoulomb, NorSand, cone_slope, cone_strength
+from ._core import (
+    CamClay,
+    ConeMatch,
+    DruckerPrager,
+    InputError,
+    MohrCoulomb,
+    NorSand,
+    Sanisand,
+    cone_slope,
+    cone_strength,
+)
 from .checks import member, positive, real_numbers
 from .mesh import floats
 
@@ -112,14 +122,8 @@ def nor_sand_state(
     """
     _check_overconsolidation(overconsolidation)
     pressure, q = _pressure_and_q(law, stress)
-    psi = np.broadcast_to(real_numbers("state_parameter", state_parameter), pressure.shape)
-    void_ratio = law.critical_void_ratio - law.critical_compression * np.log(pressure / 1e3) + psi
-    wrong = ~(void_ratio > 0)
-    if wrong.any():
-        raise InputError(
-            f"state_parameter is {psi[wrong][0]:g} at {pressure[wrong][0]:g} Pa, where the void ratio would be "
-            f"{void_ratio[wrong][0]:g}, expected a positive one"
-        )
+    critical = law.critical_void_ratio - law.critical_compression * np.log(pressure / 1e3)
+    psi, log_volume = _volume_beside(law, critical, state_parameter, pressure)
     fall, log_image = law.coupling * law.dilatancy, np.zeros_like(pressure)
     q *= _direction_factor(law, floats("stress", stress, (None, None)), q)
     for _ in range(100):  # g q = M_i p (1 + ln(p_i / p)), where M_i depends a little on p_i
@@ -128,8 +132,47 @@ def nor_sand_state(
     image = overconsolidation * pressure * np.exp(log_image)
     return {
         "log_image_pressure": np.log(image / (law.image_pressure + law.attraction)),
-        "log_specific_volume": np.log((1 + void_ratio) / (1 + law.void_ratio)),
+        "log_specific_volume": log_volume,
     }
+
+
+def sanisand_state(law: Sanisand, stress: ArrayLike, state_parameter: ArrayLike) -> dict[str, NDArray[np.float64]]:
+    """The states of points of Sanisand that begin with a stress and a state parameter.
+
+    Soil that has never been loaded begins with the back stress ratio of its stress by itself, so that the void ratio is all that
+    is given here: the critical one at the pressure of the stress plus the state parameter.
+
+    Args:
+        law: the sand.
+        stress: effective stress [Pa], tension positive, shape (n, 4) or (n, 6); its mean must be below the attraction.
+        state_parameter: psi, void ratio less that of the critical state line at the same pressure [-], a number or shape (n,):
+            positive for loose soil, negative for dense.
+
+    Returns:
+        `log_specific_volume`, shape (n,), for ``Model.set_state(name, values)``.
+
+    Raises:
+        InputError: a stress without pressure, or a state parameter without a positive void ratio.
+    """
+    pressure, _ = _pressure_and_q(law, stress)
+    relative = pressure / Sanisand.atmospheric_pressure
+    critical = law.critical_void_ratio - law.critical_compression * relative**law.critical_exponent
+    return {"log_specific_volume": _volume_beside(law, critical, state_parameter, pressure)[1]}
+
+
+def _volume_beside(
+    law: NorSand | Sanisand, critical: NDArray[np.float64], state_parameter: ArrayLike, pressure: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """State parameters, and the logarithms of the specific volumes beside the critical ones over that of the law's start."""
+    psi = np.broadcast_to(real_numbers("state_parameter", state_parameter), pressure.shape)
+    void_ratio = critical + psi
+    wrong = ~(void_ratio > 0)
+    if wrong.any():
+        raise InputError(
+            f"state_parameter is {psi[wrong][0]:g} at {pressure[wrong][0]:g} Pa, where the void ratio would be "
+            f"{void_ratio[wrong][0]:g}, expected a positive one"
+        )
+    return psi, np.log((1 + void_ratio) / (1 + law.void_ratio))
 
 
 def _check_overconsolidation(ratio: float) -> None:
@@ -137,7 +180,9 @@ def _check_overconsolidation(ratio: float) -> None:
         raise InputError(f"overconsolidation is {ratio}, expected at least 1")
 
 
-def _pressure_and_q(law: CamClay | NorSand, stress: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _pressure_and_q(
+    law: CamClay | NorSand | Sanisand, stress: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Pressure from the attraction on and sqrt(3 J2) [Pa] of stresses that must have pressure."""
     s = floats("stress", stress, (None, None))
     mean = s[:, :3].mean(axis=1)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from bridge_cases import column
 from core_cases import box, rollers, run
+from sanisand_cases import sand
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -32,6 +33,9 @@ LAWS = {
     "undrained Cam-Clay": mpm.Undrained(CLAY, water_modulus=2e8, porosity=0.5),
     "NorSand": SAND,
     "undrained NorSand": mpm.Undrained(SAND, water_modulus=2e8, porosity=0.5),
+    "SANISAND": sand(),
+    "undrained SANISAND": mpm.Undrained(sand(), water_modulus=2e8, porosity=0.45),
+    "Hencky SANISAND": mpm.Hencky(sand()),
     "Hencky": mpm.Hencky(SOIL),
     "viscoplastic": mpm.ViscoplasticMohrCoulomb(
         **ELASTIC, cohesion=10e3, friction_angle=25.0, dilation_angle=5.0, viscosity=1e-6
