@@ -1,17 +1,20 @@
-"""Laboratory tests on one point of any law: oedometer, triaxial drained and undrained, simple shear; stress paths.
+"""Laboratory tests on one point of any law: oedometer, triaxial drained and undrained, simple shear, cycles; stress paths.
 
-The undrained triaxial test keeps the volume constant. With --undrained the law itself includes pore water, and the excess pore
+The undrained triaxial test and cyclic tests keep the volume constant. Cyclic tests load to and fro between two stresses until
+the strain or the number of cycles is reached. With --undrained the law itself includes pore water, and the excess pore
 pressure is drawn. A law of your own is given by --python-law FILE.py:CLASS, or by --umat LIBRARY.so with its PROPS.
 """
 
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from common.checks import check_effect, say
+from common.cyclic_loading import CYCLIC, amplitude, cycles, draw_cycles, first_cycle
 from common.figures import curve_figure
 from common.history import History
 from common.options import add_choice, add_count, add_number, check, study_parser
@@ -26,9 +29,11 @@ import mpm_core as mpm
 
 SOFTEST = 10e3
 """Oedometric modulus [Pa] below which there is no soil: mud has some 50 kPa"""
-TESTS = ("oedometer", "drained", "undrained", "shear")
+TESTS = ("oedometer", "drained", "undrained", "shear", *CYCLIC)
 COLUMNS = ["axial_strain", "shear_strain", "volumetric_strain", "p_Pa", "q_Pa", "shear_stress_Pa",
            "excess_pore_pressure_Pa", "plastic_strain"]  # fmt: skip
+OF_CYCLES = ["cycles", "axial_difference_Pa"]
+"""Columns of cyclic tests only"""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -38,10 +43,14 @@ def parser() -> ArgumentParser:
     """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_choice(p, "--test", "drained", TESTS, "compression without lateral strain; triaxial with constant lateral "
-               "stress; triaxial at constant volume; simple shear at constant volume")  # fmt: skip
+               "stress; triaxial at constant volume; simple shear at constant volume; cycles of these two")  # fmt: skip
     add_number(p, "--pressure", 20e3, "Pa", "isotropic pressure at the start", at_least=0)
-    add_number(p, "--strain", 0.2, "-", "axial strain to reach (shear strain in simple shear), in compression", above=0)
-    add_count(p, "--steps", 400, "increments")
+    add_number(p, "--strain", 0.2, "-", "axial strain to reach (shear strain in simple shear), in compression; single "
+               "amplitude with which cyclic tests end", above=0)  # fmt: skip
+    add_count(p, "--steps", 400, "increments; cyclic tests choose theirs by the change of the stress")
+    add_number(p, "--stress-ratio", 0.2, "-", "amplitude of cycles: shear stress, or half the difference of axial and lateral "
+               "stress, over the pressure at the start", above=0)  # fmt: skip
+    add_count(p, "--cycles", 100, "number of cycles after which a cyclic test ends")
     add_number(p, "--rate", None, "1/s", "rate of this strain, for laws that depend on time; without one the test is infinitely "
                "slow", above=0)  # fmt: skip
     add_soil_options(p, dilation_angle=0.0)
@@ -53,6 +62,11 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     a = p.parse_args(arguments)
     check_law_options(p, a)
+    cyclic = a.test in CYCLIC
+    check_effect(p, a, cyclic, ("--stress-ratio", "--cycles"), f"--test {' or '.join(CYCLIC)}")
+    check_effect(p, a, not cyclic, ("--steps", "--rate"), "a test without cycles")
+    check(p, not cyclic or a.pressure > 0,
+          lambda: f"--pressure is {a.pressure:g} Pa, expected above 0 for cycles of --stress-ratio times the pressure")  # fmt: skip
     own = bool(a.python_law or a.umat)
     check_effect(
         p, a, own or a.material == "viscoplastic", ("--rate",), "--material viscoplastic, --python-law or --umat"
@@ -65,7 +79,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
 
 def in_percent(a: Namespace) -> str:
     """What a warning says of a strain that is probably in percent; empty for others. Simple shear may go far."""
-    if a.strain <= (5.0 if a.test == "shear" else 1.0):
+    if a.strain <= (5.0 if "shear" in a.test else 1.0):
         return ""
     return f"--strain is {a.strain:g}, a fraction: {a.strain:g} % are {a.strain / 100:g}"
 
@@ -90,7 +104,7 @@ def increment(kind: str, size: float) -> list[float | None]:
         "drained": [-size, None, None, 0.0, 0.0, 0.0],
         "undrained": [-size, size / 2, size / 2, 0.0, 0.0, 0.0],
         "shear": [0.0, 0.0, 0.0, size, 0.0, 0.0],
-    }[kind]
+    }[kind.removeprefix("cyclic-").replace("triaxial", "undrained")]
 
 
 def row(test: mpm.ElementTest) -> dict[str, float]:
@@ -109,6 +123,8 @@ def row(test: mpm.ElementTest) -> dict[str, float]:
 
 def run(test: mpm.ElementTest, a: Namespace, history: History) -> str | None:
     """Apply all increments; returns why the test ended early, if it did."""
+    if a.test in CYCLIC:
+        return run_cycles(test, a, history)
     history.add(**row(test))
     size = a.strain / a.steps
     for _ in range(a.steps):
@@ -120,11 +136,37 @@ def run(test: mpm.ElementTest, a: Namespace, history: History) -> str | None:
     return None
 
 
+def run_cycles(test: mpm.ElementTest, a: Namespace, history: History) -> str | None:
+    """Apply all cycles; returns why the test ended early, if it did."""
+
+    def add(number: float) -> None:
+        history.add(**row(test), cycles=number, axial_difference_Pa=2 * amplitude("cyclic-triaxial", test.stress))
+
+    add(0.0)
+    try:
+        for number in cycles(test, a.test, partial(increment, a.test), a.stress_ratio * a.pressure, a.strain, a.cycles):
+            add(number)
+    except mpm.RunError as error:
+        return str(error)
+    return None
+
+
+def milestones(history: History, a: Namespace) -> dict[str, float | None]:
+    """Numbers of cycles until soil counts as liquefied, by the usual criteria; None where it does not."""
+    strain = history["shear_strain" if a.test == "cyclic-shear" else "axial_strain"]
+    return {
+        "cycles_to_excess_pore_pressure_ratio_0.9": first_cycle(history, history["p_Pa"] < 0.1 * a.pressure),
+        "cycles_to_strain_0.025": first_cycle(history, np.abs(strain) > 0.025),
+    }
+
+
 # --- 3. Pictures and the end -----------------------------------------------------------------------------------------
 
 
 def draw(history: History, a: Namespace, path: Path) -> None:
     """Stress path, stress over strain, and volume over strain, or pore pressure, or the mean stress where volume is kept."""
+    if a.test in CYCLIC:
+        return draw_cycles(history, a.test, path)
     shear = a.test == "shear"
     strain = history["shear_strain" if shear else "axial_strain"]
     strain_label = "Shear strain [-]" if shear else "Axial strain, compression [-]"
@@ -163,9 +205,11 @@ def main(arguments: list[str] | None = None) -> int:
     say(angles_in_radians([law]))
     folder = open_results(a)
     test = mpm.ElementTest(law, [-a.pressure] * 3 + [0.0] * 3)
-    with History(folder / "history.csv", COLUMNS) as history:
+    columns = COLUMNS + (OF_CYCLES if a.test in CYCLIC else [])
+    with History(folder / "history.csv", columns) as history:
         stopped = run(test, a, history)
-    end = {name: float(history[name][-1]) for name in COLUMNS}
+    end = {name: float(history[name][-1]) for name in columns}
+    end |= milestones(history, a) if a.test in CYCLIC else {}
     summary = {"finished_run": stopped is None, "stopped_because": stopped, "steps": len(history) - 1, **end}
     pictures = {"stress_path": lambda: draw(history, a, folder / "stress_path.png")}
     largest = history["q_Pa"].max()

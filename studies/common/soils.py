@@ -13,6 +13,7 @@ import mpm_core as mpm
 
 from .checks import check_effect
 from .options import add_choice, add_code, add_number, add_switch
+from .parameters import did_you_mean
 
 MATERIALS = (
     "mohr-coulomb",
@@ -23,8 +24,16 @@ MATERIALS = (
     "drucker-prager",
     "cam-clay",
     "nor-sand",
+    "sanisand",
     "elastic",
 )
+TOYOURA = {
+    "rigidity": 125.0, "poisson": 0.05, "critical_slope": 1.25, "extension_ratio": 0.712, "critical_void_ratio": 0.934,
+    "critical_compression": 0.019, "critical_exponent": 0.7, "hardening": 7.05, "hardening_void_ratio": 0.968,
+    "bounding_exponent": 1.1, "dilatancy": 0.704, "dilatancy_exponent": 3.5, "fabric_limit": 4.0, "fabric_rate": 600.0,
+    "void_ratio": 0.8, "largest_pressure": 200e3, "attraction": 1e3,
+}  # fmt: skip
+"""SANISAND of Toyoura sand (Dafalias & Manzari 2004, table 1), and where it begins unless said otherwise"""
 
 
 FRICTIONAL = ("mohr-coulomb", "viscoplastic", "softening", "drucker-prager")
@@ -35,9 +44,11 @@ ONLY_WITH = {
     ("--critical-slope", "--void-ratio", "--attraction"): ("cam-clay", "nor-sand"),
     ("--critical-void-ratio", "--critical-compression", "--dilatancy", "--hardening", "--rigidity", "--image-pressure",
      "--coupling"): ("nor-sand",),
+    ("--sanisand",): ("sanisand",),
     ("--friction-angle", "--dilation-angle", "--tension-cutoff"): FRICTIONAL,
     ("--cohesion",): (*FRICTIONAL, "tresca", "von-mises"),
-    ("--young",): tuple(name for name in MATERIALS if name not in ("cam-clay", "nor-sand")),
+    ("--young",): tuple(name for name in MATERIALS if name not in ("cam-clay", "nor-sand", "sanisand")),
+    ("--poisson",): tuple(name for name in MATERIALS if name != "sanisand"),
 }  # fmt: skip
 """Options that only some laws have"""
 
@@ -71,6 +82,9 @@ def add_law_options(
     for name, default in [("critical_void_ratio", 1.0), ("critical_compression", 0.03), ("dilatancy", 4.0), ("hardening", 100.0),
                           ("rigidity", 200.0), ("image_pressure", 20e3), ("coupling", 0.2)]:  # fmt: skip
         add_parameter(p, mpm.NorSand, name, default, "NorSand: ")
+    p.add_argument("--sanisand", nargs="*", default=[], metavar="NAME=VALUE",
+                   help="SANISAND: parameters that differ from those of Toyoura sand, such as void_ratio=0.75 dilatancy=0.5; "
+                        "docs/api/law_parameters.md has all of them with their units")  # fmt: skip
     add_switch(
         p, "--undrained", False, "undrained soil: a law of effective stresses, and pore water that does not drain"
     )
@@ -172,6 +186,28 @@ def _strength_properties(words: Sequence[str]) -> dict[int, str]:
     return named
 
 
+def sanisand_of(words: Sequence[str]) -> mpm.Sanisand:
+    """Toyoura sand with the parameters that differ, "void_ratio=0.75".
+
+    Raises:
+        InputError: a word that is no name, equals sign and number, a name that the law does not have, or a value out of its range.
+    """
+    parameters, known = dict(TOYOURA), [p.name for p in mpm.Sanisand.parameters]
+    for word in words:
+        name, equals, value = word.partition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise mpm.InputError(f"--sanisand has '{word}', expected NAME=VALUE such as void_ratio=0.75")
+        if name not in known:
+            near = did_you_mean(name, known) or f", expected one of {', '.join(known)}"
+            raise mpm.InputError(f"--sanisand has '{name}', which is no parameter of the law{near}")
+        parameters[name] = number
+    return mpm.Sanisand(**parameters)
+
+
 def _skeleton(a: argparse.Namespace) -> Any:
     elastic = {"young": a.young, "poisson": a.poisson}
     if a.umat:
@@ -210,6 +246,8 @@ def _skeleton(a: argparse.Namespace) -> Any:
                 poisson=a.poisson, image_pressure=a.image_pressure, void_ratio=a.void_ratio, coupling=a.coupling,
                 attraction=a.attraction,
             )  # fmt: skip
+        case "sanisand":
+            return sanisand_of(a.sanisand)
         case "viscoplastic":
             return mpm.ViscoplasticMohrCoulomb(**elastic, **strength, viscosity=a.viscosity)
         case "softening":

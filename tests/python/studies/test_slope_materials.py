@@ -21,7 +21,7 @@ import mpm_core as mpm  # noqa: E402
 slope = importlib.import_module("slope")
 
 SMALL = "--cell-size 0.25 --crest 1 --particles-per-cell 3 --nmd".split()
-WITHOUT_COHESION = {"cam-clay", "nor-sand", "undrained NorSand", "elastic", "undrained Cam-Clay"}
+WITHOUT_COHESION = {"cam-clay", "nor-sand", "sanisand", "undrained NorSand", "elastic", "undrained Cam-Clay"}
 OTHERS = {
     "finite strain": ["--finite-strain"],
     "undrained": ["--undrained", "--water-modulus", "1e6"],

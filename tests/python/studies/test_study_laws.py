@@ -166,3 +166,35 @@ def test_quantities_in_other_units_are_warned_of(tmp_path, options, words):
     result = study("element_test", tmp_path, "--steps", "5", *options)
     assert result.returncode == 0 and words in result.stderr
     assert result.stderr.count("warning: ") == bool(words)
+
+
+def test_cycles_of_sand_between_two_stresses(tmp_path):
+    sand = ["--material", "sanisand", "--sanisand", "void_ratio=0.85", "attraction=0", "--pressure", "100e3"]
+    result = study("element_test", tmp_path, "--test", "cyclic-shear", *sand, "--stress-ratio", "0.15", "--cycles", "8")
+    assert result.returncode == 0, result.stderr
+    end, history = summary(tmp_path), np.genfromtxt(tmp_path / "history.csv", delimiter=",", names=True)
+    largest, pressure = history["shear_stress_Pa"], history["p_Pa"]
+    assert (largest.max(), largest.min()) == pytest.approx((15e3, -15e3), rel=5e-3)
+    turns = np.flatnonzero(np.diff(history["cycles"]) > 0) + 1
+    assert abs(largest[turns]) == pytest.approx(15e3, rel=5e-3) and len(turns) == 16 == 2 * end["cycles"]
+    liquefied = end["cycles_to_excess_pore_pressure_ratio_0.9"]
+    assert 2 < liquefied < 8 and (pressure[history["cycles"] < liquefied] > 10e3).all()
+    assert (tmp_path / "stress_path.png").stat().st_size > 0
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--sanisand", "void_ratio"], "--sanisand has 'void_ratio', expected NAME=VALUE such as void_ratio=0.75"),
+        (["--sanisand", "voidratio=0.7"], "no parameter of the law; did you mean void_ratio?"),
+        (["--sanisand", "porosity=0.4"], "no parameter of the law, expected one of rigidity, poisson, "),
+        (["--sanisand", "void_ratio=-1"], "void_ratio = -1, but it must be positive"),
+        (["--test", "cyclic-shear", "--steps", "100"], "--steps is given, expected a test without cycles"),
+        (["--test", "cyclic-shear", "--pressure", "0"], "--pressure is 0 Pa, expected above 0 for cycles"),
+        (["--cycles", "10"], "--cycles is given, expected --test cyclic-shear or cyclic-triaxial with it"),
+        (["--poisson", "0.3"], "--poisson is given, expected --material "),
+    ],
+)
+def test_wrong_options_of_sand_and_cycles_are_named(tmp_path, options, message):
+    result = study("element_test", tmp_path, "--material", "sanisand", *options)
+    assert result.returncode == 2 and message in result.stderr, result.stderr
