@@ -1,5 +1,6 @@
 #include "explicit/explicit_step.h"
 
+#include "explicit/dashpots.h"
 #include "explicit/momentum.h"
 #include "explicit/particle_update.h"
 #include "explicit/two_phase_step.h"
@@ -46,7 +47,7 @@ void add_nodal_forces(Model<G>& model, const ExplicitOptions& options, double dt
 {
   add_contact_forces(model, dt, field);
   add_rayleigh_forces(model, options.rayleigh, field);
-  add_dashpot_forces(model.mesh, gravity_at(model, model.time), model.time, dt, field);
+  add_forces_of_ground(model.mesh, gravity_at(model, model.time), model.time, dt, field);
 }
 
 /// The step of the paper: stresses last, with the velocities of the moved particles (MUSL).
@@ -78,10 +79,18 @@ void modified_update_stress_last(Model<G>& model, const ExplicitOptions& options
     // a(x_p) follows from the moments of the cells, so that the particles are visited once, for (18) and (20) together.
     clock.begin(Phase::mapping);
     find_velocity_change(field, replaced, dt);
+    if (options.has_dashpots)
+    {
+      if (options.renews_dashpots)
+        prepare_dashpots(model);
+      add_dashpots(model, replaced, dt, field);
+      find_velocity_change(field, replaced, dt);
+    }
     scatter_momentum<G>(mesh, exchange, part_of_particles(field), field.moments, field.velocity_change, field.velocity);
     gain_resting_momentum<G>(model, replaced, field, field.velocity);
     sum_shared(exchange, field.velocity);
     find_mapped_velocity(1 - replaced, field);
+    keep_driven_velocity<G>(field.dashpots, dt, field);
   }
   separate_fields(model, dt);
   for (VelocityField<G>& field : model.fields)
@@ -117,6 +126,8 @@ void update_stress_last(Model<G>& model, const ExplicitOptions& options, double 
   {
     clock.begin(Phase::momentum);
     find_acceleration(gravity, options.damping, dt, field);
+    find_advanced_velocity(dt, field);
+    add_dashpot_forces(model.mesh, model.time, dt, false, field);
     find_velocity_change(field, options.pic_fraction, dt);
     find_advanced_velocity(dt, field);
     add_work(field, model.exchange.owned, gravity, options.damping, dt, model.totals);

@@ -26,7 +26,9 @@ struct ExplicitOptions
   bool moving_cells = false; ///< cells with particles move with them
   bool nmd = false;          ///< nodal mixed discretisation
   Integration integration = Integration::particles;
-  bool reproducible = false; ///< particles are the same to the last bit on any number of ranks
+  bool has_dashpots = false;    ///< some rank has absorbing sides
+  bool renews_dashpots = false; ///< finds anew what they know of the particles beside them, see `prepare_dashpots`
+  bool reproducible = false;    ///< particles are the same to the last bit on any number of ranks
 };
 
 /// Whether the mean stresses of nodal forces are averaged over nodes (nodal mixed discretisation), and by what

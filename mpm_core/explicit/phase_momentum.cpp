@@ -48,11 +48,7 @@ Phases<D> damping_forces(const PhaseForces<D>& f, const Support<D>* support, con
     force[a] = local_damping(damping, f.on_soil[a] + f.on_water[a],
                              f.soil_mass * start.soil[a] + f.water_mass * start.water[a], dt);
   if (support)
-  {
-    Support<D> held = *support;
-    held.value.fill(0);
-    impose<D>(held, force);
-  }
+    take_out_supported<D>(*support, force);
   Phases<D> forces;
   const double soil_part = f.soil_mass / (f.soil_mass + f.water_mass);
   for (int a = 0; a < D; ++a)

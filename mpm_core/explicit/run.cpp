@@ -82,6 +82,20 @@ void require_integration(const Model<G>& model, const ExplicitOptions& options)
                      "velocity fields");
 }
 
+/// Whether there are absorbing or driven sides.
+/// @throws InputError with strains by the velocity of the start, which has dashpots of the step before
+/// @note Collective
+template <class G>
+bool has_dashpots(const Model<G>& model, StressUpdate stress_update)
+{
+  int any = model.fields.front().dashpots.empty() ? 0 : 1;
+  MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, model.exchange.comm);
+  if (any && stress_update == StressUpdate::first)
+    throw InputError("stress_update is FIRST with absorbing or driven sides, whose dashpots would generate energy; "
+                     "expected MODIFIED_LAST or LAST");
+  return any;
+}
+
 /// @param option  that runs with more than particles and boundary conditions do not have, as `name is value`
 /// @throws InputError what the run has beside these
 template <class G>
@@ -171,6 +185,7 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
   if (options.moving_cells)
     begin_moving_cells(model);
   ExplicitOptions of_step = options;
+  of_step.has_dashpots = has_dashpots(model, options.stress_update);
   std::int64_t done = 0;
   double dt = 0;
   const double closeness = 1e-9 * std::abs(run.until);
@@ -186,6 +201,7 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
       convert_near_surfaces(model, control_interval * dt);
       of_step.pic_fraction = pic_fraction_of_step(run.pic, dt, critical);
     }
+    of_step.renews_dashpots = done % control_interval == 0;
     explicit_step(model, of_step, dt);
     if (model.failure)
       break;

@@ -1,5 +1,6 @@
 #include "explicit/two_phase_step.h"
 
+#include "explicit/dashpots.h"
 #include "explicit/momentum.h"
 #include "explicit/particle_update.h"
 #include "explicit/phase_momentum.h"
@@ -36,12 +37,20 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
   follow_supports<G>(soil, water.motion, water.motion.start_velocity);
   add_wet_contact_forces(model, dt);
   close_sides<G>(soil, water, soil.start_velocity, water.motion.start_velocity);
-  add_dashpot_forces(mesh, gravity, model.time, dt, soil, &water.motion);
+  add_forces_of_ground(mesh, gravity, model.time, dt, soil, &water.motion);
   // Momentum balance of both phases, coupled by the drag at the step's end
   clock.begin(Phase::momentum);
   find_phase_accelerations(gravity, options.damping, dt, density, soil, water);
   // Second mapping (19)
   clock.begin(Phase::mapping);
+  if (options.has_dashpots)
+  {
+    for (VelocityField<G>* phase : {&soil, &water.motion})
+      find_velocity_change(*phase, options.pic_fraction, dt);
+    if (options.renews_dashpots)
+      prepare_dashpots(model);
+    add_dashpots(model, options.pic_fraction, dt, soil, &water.motion);
+  }
   for (VelocityField<G>* phase : {&soil, &water.motion})
   {
     find_velocity_change(*phase, options.pic_fraction, dt);
@@ -51,6 +60,7 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
                              phase->velocity); // of the soil: the mass of water changes, whose moments follow
     sum_shared(exchange, phase->velocity);
     find_mapped_velocity(1 - options.pic_fraction, *phase);
+    keep_driven_velocity<G>(soil.dashpots, dt, *phase);
   }
   follow_supports<G>(soil, water.motion, water.motion.velocity);
   close_sides<G>(soil, water, soil.velocity, water.motion.velocity);

@@ -1,6 +1,8 @@
 #include "model/absorbing.h"
 
 #include "base/eigen.h"
+#include "base/tensor.h"
+#include "model/contact_pair.h"
 #include "model/mapping.h"
 #include "model/material_points.h"
 #include "parallel/agreement.h"
@@ -211,33 +213,57 @@ MovingNode<D> moving_node(const VelocityField<G>& field, const VelocityField<G>*
   return node;
 }
 
-/// m a = R + f,  f = sum over entries of held - K u + A t - C (v + dt a / 2 - v_beside); or the a of a rigid side.
-/// @param node  m, v and R
-template <class G, int D = G::dim>
-Vector<D> acceleration(std::span<const DashpotNode<D>> entries, const Beside<G>& beside, double dt,
-                       const MovingNode<D>& node)
+/// Gives the nodes of driven sides the velocity of the ground, as boundary conditions do.
+template <class G>
+void drive_nodes(const Beside<G>& beside, VelocityField<G>& field, VelocityField<G>* water)
 {
-  Eigen::Matrix<double, D, D> inertia = node.mass * Eigen::Matrix<double, D, D>::Identity();
-  Eigen::Matrix<double, D, 1> force = Eigen::Map<const Eigen::Matrix<double, D, 1>>(node.residual.data());
-  Vector<D> found;
+  for (const DashpotNode<G::dim>& entry : field.dashpots)
+    if (entry.is_rigid)
+      for (VelocityField<G>* phase : {&field, water})
+        if (phase && !is_light(*phase, entry.node))
+          phase->start_velocity[entry.node] = beside.at(entry).velocity;
+}
+
+/// held + A t - K u over the entries of a node; on a driven side what makes m a of its motion with a residual.
+template <class G, int D = G::dim>
+Vector<D> force_of_ground(std::span<const DashpotNode<D>> entries, const Beside<G>& beside, double dt,
+                          const MovingNode<D>& node)
+{
+  Vector<D> force{};
   for (const DashpotNode<D>& entry : entries)
   {
     const auto ground = beside.at(entry);
     if (entry.is_rigid)
     {
       for (int a = 0; a < D; ++a)
-        found[a] = (ground.velocity[a] - node.velocity[a]) / dt;
-      return found;
+        force[a] = node.mass * (ground.velocity[a] - node.velocity[a]) / dt - node.residual[a];
+      return force;
     }
-    Vector<D> against;
+    const Vector<D> spring = product<D>(entry.stiffness, entry.displacement);
     for (int a = 0; a < D; ++a)
-      against[a] = node.velocity[a] - ground.velocity[a];
-    const Vector<D> drag = product<D>(entry.damping, against), spring = product<D>(entry.stiffness, entry.displacement);
-    inertia += 0.5 * dt * as_eigen<D>(entry.damping);
-    for (int a = 0; a < D; ++a)
-      force[a] += entry.held[a] + entry.area * ground.traction[a] - spring[a] - drag[a];
+      force[a] += entry.held[a] + entry.area * ground.traction[a] - spring[a];
+  }
+  return force;
+}
+
+/// The acceleration that dashpots give to a node: (m + k dt C / 2) a = sum over entries of C (v_beside - v).
+/// @param v  mean velocity at the node over the step, without dashpots
+/// @param k  part of a by which that velocity changes
+template <class G, int D = G::dim>
+Vector<D> acceleration_by_dashpots(std::span<const DashpotNode<D>> entries, const Beside<G>& beside, double dt,
+                                   double mass, double k, const Vector<D>& v)
+{
+  Eigen::Matrix<double, D, D> inertia = mass * Eigen::Matrix<double, D, D>::Identity();
+  Eigen::Matrix<double, D, 1> force = Eigen::Matrix<double, D, 1>::Zero();
+  for (const DashpotNode<D>& entry : entries)
+  {
+    const auto damping = as_eigen<D>(entry.damping);
+    const Vector<D> against = difference<D>(beside.at(entry).velocity, v);
+    inertia += 0.5 * k * dt * damping;
+    force += damping * Eigen::Map<const Eigen::Matrix<double, D, 1>>(against.data());
   }
   const Eigen::Matrix<double, D, 1> solution = inertia.inverse() * force;
+  Vector<D> found;
   std::copy_n(solution.data(), D, found.begin());
   return found;
 }
@@ -273,10 +299,11 @@ void set_absorbing_sides(Model<G>& model, std::span<const AbsorbingSide> sides, 
 }
 
 template <class G>
-void add_dashpot_forces(const Mesh<G::dim>& mesh, const Vector<G::dim>& gravity, double time, double dt,
-                        VelocityField<G>& field, const VelocityField<G>* water)
+void add_forces_of_ground(const Mesh<G::dim>& mesh, const Vector<G::dim>& gravity, double time, double dt,
+                          VelocityField<G>& field, VelocityField<G>* water)
 {
   constexpr int D = G::dim;
+  drive_nodes(Beside<G>(mesh, field, time - 0.5 * dt), field, water);
   const Beside<G> beside(mesh, field, time + 0.5 * dt);
   for_each_node<D>(field.dashpots,
                    [&](std::span<const DashpotNode<D>> entries)
@@ -284,11 +311,46 @@ void add_dashpot_forces(const Mesh<G::dim>& mesh, const Vector<G::dim>& gravity,
                      const Index i = entries[0].node;
                      if (is_light(field, i))
                        return;
-                     const MovingNode<D> node = moving_node(field, water, i, gravity);
-                     const Vector<D> found = acceleration<G, D>(entries, beside, dt, node);
+                     const Vector<D> force =
+                         force_of_ground<G, D>(entries, beside, dt, moving_node(field, water, i, gravity));
                      for (int a = 0; a < D; ++a)
-                       field.nodes[i].traction[a] += node.mass * found[a] - node.residual[a];
+                       field.nodes[i].traction[a] += force[a];
                    });
+}
+
+template <class G>
+void add_dashpot_forces(const Mesh<G::dim>& mesh, double time, double dt, bool shared, VelocityField<G>& field,
+                        VelocityField<G>* water)
+{
+  constexpr int D = G::dim;
+  const Beside<G> beside(mesh, field, time + 0.5 * dt);
+  const auto add_to_node = [&](std::span<const DashpotNode<D>> entries)
+  {
+    const Index i = entries[0].node;
+    if (is_light(field, i) || entries[0].is_rigid)
+      return;
+    const double of_soil = field.nodes[i].mass, of_water = water && !is_light(*water, i) ? water->nodes[i].mass : 0;
+    const double mass = of_soil + of_water;
+    Vector<D> mean;
+    for (int a = 0; a < D; ++a)
+    {
+      mean[a] = 0.5 * of_soil / mass * (field.start_velocity[i][a] + field.velocity[i][a]);
+      if (of_water > 0)
+        mean[a] += 0.5 * of_water / mass * (water->start_velocity[i][a] + water->velocity[i][a]);
+    }
+    const double k = shared ? entries[0].response : 1;
+    Vector<D> gained = acceleration_by_dashpots<G, D>(entries, beside, dt, mass, k, mean);
+    if (const Support<D>* support = support_of(field, i))
+      take_out_supported<D>(*support, gained);
+    for (int a = 0; a < D; ++a)
+    {
+      field.nodes[i].traction[a] += mass * gained[a];
+      field.acceleration[i][a] += gained[a];
+      if (of_water > 0)
+        water->acceleration[i][a] += gained[a];
+    }
+  };
+  for_each_node<D>(field.dashpots, add_to_node);
 }
 
 template <class G>
@@ -307,8 +369,9 @@ void move_springs(const Mesh<G::dim>& mesh, double time, double dt, VelocityFiel
 
 #define INSTANTIATE(G)                                                                                                 \
   template void set_absorbing_sides(Model<G>&, std::span<const AbsorbingSide>, const Vector<G::dim>&);                 \
-  template void add_dashpot_forces(const Mesh<G::dim>&, const Vector<G::dim>&, double, double, VelocityField<G>&,      \
-                                   const VelocityField<G>*);                                                           \
+  template void add_forces_of_ground(const Mesh<G::dim>&, const Vector<G::dim>&, double, double, VelocityField<G>&,    \
+                                     VelocityField<G>*);                                                               \
+  template void add_dashpot_forces(const Mesh<G::dim>&, double, double, bool, VelocityField<G>&, VelocityField<G>*);   \
   template void move_springs(const Mesh<G::dim>&, double, double, VelocityField<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

@@ -26,14 +26,26 @@ struct AbsorbingSide
 template <class G>
 void set_absorbing_sides(Model<G>& model, std::span<const AbsorbingSide> sides, const Vector<G::dim>& gravity);
 
-/// Adds the forces of dashpots, springs and free fields over a step to the tractions at the nodes of a field. Dashpots
-/// take the mean over the step of the velocity that they lead to, so that they do not limit it.
+/// Adds the forces of the ground beside absorbing sides but for those of dashpots over a step to the tractions at the
+/// nodes of a field: what held them, springs and stresses of free fields. Nodes of driven sides get the velocity of the
+/// ground at the start of the step and the force that leads to that at its end.
 /// @param water  where it moves by itself: the forces act on soil and water as one mass, and are added to those of the
 ///               soil
 /// @pre nodes have the sums of all ranks
 template <class G>
-void add_dashpot_forces(const Mesh<G::dim>& mesh, const Vector<G::dim>& gravity, double time, double dt,
-                        VelocityField<G>& field, const VelocityField<G>* water = nullptr);
+void add_forces_of_ground(const Mesh<G::dim>& mesh, const Vector<G::dim>& gravity, double time, double dt,
+                          VelocityField<G>& field, VelocityField<G>* water = nullptr);
+
+/// Adds the forces of dashpots over a step to tractions and accelerations of the nodes. They act against the mean
+/// velocity of the particles at a node over the step, dashpots included. These take energy out then, however stiff they
+/// are, and do not limit the step. With the mean velocity of the node itself, whose acceleration the particles share
+/// with those of other nodes, stiff dashpots would generate energy.
+/// @param shared  whether velocities are those of particles, which share the accelerations of nodes; else each node has
+///                its own
+/// @pre start_velocity, velocity and accelerations are those without dashpots
+template <class G>
+void add_dashpot_forces(const Mesh<G::dim>& mesh, double time, double dt, bool shared, VelocityField<G>& field,
+                        VelocityField<G>* water = nullptr);
 
 /// Moves the springs with their nodes, relative to the free fields at a time.
 template <class G>

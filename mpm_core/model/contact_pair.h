@@ -28,11 +28,7 @@ inline Vector<G::dim> mobility(const VelocityField<G>& field, Index node, Vector
 {
   constexpr int D = G::dim;
   if (const Support<D>* support = support_of(field, node))
-  {
-    Support<D> held = *support;
-    held.value.fill(0);
-    impose<D>(held, direction);
-  }
+    take_out_supported<D>(*support, direction);
   for (double& component : direction)
     component /= field.nodes[node].mass;
   return direction;

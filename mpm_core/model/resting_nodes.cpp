@@ -252,6 +252,17 @@ void add_pic_loss(Model<G>& model, double pic_fraction)
     model.energy.pic_loss += pic_loss_at_rest(model.particles, field, model.mesh, run, pic_fraction);
 }
 
+/// The mass matrix of resting cells times changes of nodal velocities, in the row of one of their nodes
+template <int D>
+[[gnu::always_inline]] inline Components<D> gain_of_row(const RestingCells<D>& resting,
+                                                        std::span<const Vector<D>> change, std::size_t row)
+{
+  Components<D> gained{};
+  for (Index e = resting.rows[row]; e < resting.rows[row + 1]; ++e)
+    gained += resting.masses[e] * components<D>(change[resting.columns[e]]);
+  return gained;
+}
+
 /// `kept` times what was there and a gain.
 template <int D>
 [[gnu::always_inline]] inline void gain(double kept, const Components<D>& more, Vector<D>& to)
@@ -274,9 +285,7 @@ void gain_resting_momentum(Model<G>& model, double pic_fraction, VelocityField<G
   const double flip = 1 - pic_fraction;
   for (std::size_t n = 0; n < resting.nodes.size(); ++n)
   {
-    Components<D> gained{};
-    for (Index e = resting.rows[n]; e < resting.rows[n + 1]; ++e)
-      gained += resting.masses[e] * components<D>(field.velocity_change[resting.columns[e]]);
+    const Components<D> gained = gain_of_row<D>(resting, field.velocity_change, n);
     const Index i = resting.nodes[n];
     if (!momentum.empty())
       gain<D>(1, gained, momentum[i]);
@@ -285,6 +294,16 @@ void gain_resting_momentum(Model<G>& model, double pic_fraction, VelocityField<G
   }
   resting.flip_fraction *= flip;
   resting.has_gained = resting.is_behind = true;
+}
+
+template <class G>
+void add_resting_momentum(const VelocityField<G>& field, std::span<const Vector<G::dim>> change, const MeshPart& part,
+                          std::span<Vector<G::dim>> momentum)
+{
+  const RestingCells<G::dim>& resting = field.resting;
+  for (std::size_t n = 0; n < resting.nodes.size(); ++n)
+    if (const Index i = resting.nodes[n]; part.has_node[static_cast<std::size_t>(i)])
+      gain<G::dim>(1, gain_of_row<G::dim>(resting, change, n), momentum[i]);
 }
 
 template <class G>
@@ -307,6 +326,8 @@ void move_resting_nodes(Model<G>& model, const PassOptions& options)
   template void update_resting_rows(Model<G>&);                                                                        \
   template const MeshPart& part_of_particles(VelocityField<G>&);                                                       \
   template void gain_resting_momentum(Model<G>&, double, VelocityField<G>&, std::span<Vector<G::dim>>);                \
+  template void add_resting_momentum(const VelocityField<G>&, std::span<const Vector<G::dim>>, const MeshPart&,        \
+                                     std::span<Vector<G::dim>>);                                                       \
   template void move_resting_nodes(Model<G>&, const PassOptions&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

@@ -55,6 +55,11 @@ template <class G>
 void gain_resting_momentum(Model<G>& model, double pic_fraction, VelocityField<G>& field,
                            std::span<Vector<G::dim>> momentum);
 
+/// Adds the momentum that the nodes of a part would gain of resting cells by changes of nodal velocities.
+template <class G>
+void add_resting_momentum(const VelocityField<G>& field, std::span<const Vector<G::dim>> change, const MeshPart& part,
+                          std::span<Vector<G::dim>> momentum);
+
 /// Moves resting cells with their nodes, whose gains of the step are made now, unless they have been. With small
 /// displacements, which take place without velocities, nothing is gained.
 template <class G>

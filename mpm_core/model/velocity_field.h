@@ -93,6 +93,7 @@ struct VelocityField
   std::vector<Support<D>> supports;          ///< its boundary conditions
   std::vector<Vector<D>> imposed;            ///< per support: what it changed of the velocity that was found last
   std::vector<DashpotNode<D>> dashpots;      ///< of its absorbing sides, by rising node
+  MeshPart beside_dashpots;                  ///< in explicit runs: cells with particles beside them, and their nodes
   IncomingWave<D> incoming;                  ///< through them
   std::vector<FreeField<D>> free_fields;     ///< beside them
   FarField<D> far_field;                     ///< elastic ground beyond a border; in implicit steps

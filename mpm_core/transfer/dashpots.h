@@ -22,6 +22,7 @@ struct DashpotNode
   Index free_field;       ///< number of that beside the node; `none` where the incoming wave comes through
   double area;            ///< integral of N over the facets [m^(D-1)]
   bool is_rigid;          ///< the node moves with twice the incoming wave
+  double response = 1;    ///< found in runs: change of the velocity of the particles at the node over that of the node
 };
 
 /// Place of a number among rising ones: the numbers k and k + 1 beside it, and how far it is from the first to the

@@ -52,4 +52,13 @@ inline void impose(const Support<D>& support, Vector<D>& v)
       v[i] += change * support.direction[k][i];
   }
 }
+
+/// Takes what is along supported directions out of a vector, such as a force.
+template <int D>
+inline void take_out_supported(const Support<D>& support, Vector<D>& v)
+{
+  Support<D> held = support;
+  held.value.fill(0);
+  impose<D>(held, v);
+}
 } // namespace mpm::transfer

@@ -18,14 +18,16 @@ inline const double root_2_3 = std::sqrt(2.0 / 3);
 struct Sand
 {
   const Sanisand& law;
-  double bulk;   ///< K / G
-  double radius; ///< of the yield surface in ratios of stress, sqrt(2/3) m
-  double least;  ///< pressure that is kept at least [Pa]
+  double bulk;           ///< K / G
+  double radius;         ///< of the yield surface in ratios of stress, sqrt(2/3) m
+  double least;          ///< pressure that is kept at least [Pa]
+  double least_distance; ///< from the last reversal
 };
 
 inline Sand sand_of(const Sanisand& law)
 {
-  return {law, bulk_per_shear(law), root_2_3 * law.yield_size, Sanisand::least_pressure};
+  const double radius = root_2_3 * law.yield_size;
+  return {law, bulk_per_shear(law), radius, Sanisand::least_pressure, 0.1 * radius};
 }
 
 /// G / sqrt(p) at a void ratio; loosened beyond 2, soil keeps the stiffness of 2, since (2.97 - e)^2 would rise again
@@ -169,15 +171,22 @@ double loads(const Sand& sand, const Loading<D>& at, const Strain<D>& strain)
   return product<D>(at.n, strain.deviator) - 0.5 * at.ratio * sand.bulk * strain.volumetric;
 }
 
-/// h of the hardening: infinite at a reversal, of which 1e10 is close enough
+/// b_0 of the hardening; soil looser than 1 / c_h keeps some
+inline double hardening_scale(const Sanisand& law, double pressure, double void_ratio)
+{
+  return law.rigidity * law.hardening * std::max(1 - law.hardening_void_ratio * void_ratio, 0.01) /
+         std::sqrt(pressure / Sanisand::atmospheric_pressure);
+}
+
+/// h of the hardening. At a reversal it is infinite; within a tenth of the radius of the yield surface from it, plastic
+/// strains are below a hundredth of elastic ones in any case.
 template <int D>
-double hardening(const Sanisand& law, const Point<D>& point, const SymTensor<D>& reversal, const Loading<D>& at,
+double hardening(const Sand& sand, const Point<D>& point, const SymTensor<D>& reversal, const Loading<D>& at,
                  double void_ratio)
 {
-  const double b = law.rigidity * law.hardening * std::max(1 - law.hardening_void_ratio * void_ratio, 0.01) /
-                   std::sqrt(point.pressure / Sanisand::atmospheric_pressure);
   const double since = product<D>(at.n, sum<D>(point.back, -1, reversal));
-  return b / std::max({since, -at.to_bounding, 1e-10 * b});
+  return hardening_scale(sand.law, point.pressure, void_ratio) /
+         std::max({since, -at.to_bounding, sand.least_distance});
 }
 
 /// Rates of a point on its yield surface, over the fraction of an increment
@@ -188,7 +197,7 @@ Point<D> rates(const Sand& sand, const Increment<D>& increment, const Point<D>& 
   const Strain<D>& strain = increment.strain;
   const double void_ratio = increment.void_ratio(point.fraction);
   const Loading<D> at = loading<D>(sand, point, void_ratio);
-  const double h = hardening<D>(law, point, increment.reversal, at, void_ratio);
+  const double h = hardening<D>(sand, point, increment.reversal, at, void_ratio);
   const double fabric = std::max(product<D>(point.fabric, at.n), 0.0);
   const double dilatancy = law.dilatancy * (1 + fabric) * at.to_dilatancy;
   const double c = law.extension_ratio, less = (1 - c) / c * at.slope;
@@ -227,13 +236,15 @@ Point<D> rates(const Sand& sand, const Increment<D>& increment, const Point<D>& 
   return rate;
 }
 
-/// Bound of the eigenvalues of the rates: the yield surface is narrow, and its normal turns to the direction of loading
-/// within a strain of about its radius times p / (2 G).
+/// Bound of the eigenvalues of the rates. The yield surface is narrow, and its normal turns to the direction of loading
+/// within a strain of about its radius times p / (2 G); and alpha is drawn to the bounding surface.
 template <int D>
 double stiffness_of_rates(const Sand& sand, const Increment<D>& increment, const Point<D>& point)
 {
-  const double twice = 2 * shear_per_root(sand.law, increment.void_ratio(point.fraction)) / std::sqrt(point.pressure);
+  const double void_ratio = increment.void_ratio(point.fraction);
+  const double twice = 2 * shear_per_root(sand.law, void_ratio) / std::sqrt(point.pressure);
+  const double hardening = hardening_scale(sand.law, point.pressure, void_ratio) / sand.least_distance;
   const double size = norm<D>(increment.strain.deviator) + sand.bulk * std::abs(increment.strain.volumetric);
-  return 2 * twice * size / sand.radius;
+  return (2 * twice / sand.radius + hardening) * size;
 }
 } // namespace mpm::materials::sanisand

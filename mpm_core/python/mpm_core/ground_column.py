@@ -193,30 +193,36 @@ class GroundColumn:
             half = 0.5 * self._rayleigh.mass * self._mass * damped
             force -= self._to_levels(half, half)[:, None] * self.velocity
         change = self.dt * force / self._nodal_mass[:, None]
-        change[0] = self.dt * self._base_acceleration(force[0])
-        lower, upper = change[:-1], change[1:]
-        gained = self._to_levels(self._own * lower + self._coupled * upper, self._coupled * lower + self._own * upper)
-        self.velocity += gained / self._nodal_mass[:, None]
-        if self._base is None:
-            self.velocity[0] = 0.0
+        self._take(change)
         self._displacement += self.dt * self.velocity[0]
         self._strain()
         self._steps += 1
         return viscous
 
-    def _base_acceleration(self, force: Floats) -> Floats:
-        """Acceleration of the lowest level, whose dashpots act on the mean velocity of the step, (D)."""
-        if self._base is None:
-            return 0.0 * force
-        incoming = 2 * self._base.wave(self.time + 0.5 * self.dt)
-        normal, shear = self._base.impedances
-        if np.isinf(normal):
-            return (incoming - self.velocity[0]) / self.dt
-        damping = np.array([shear] * (len(force) - 1) + [normal])
+    def _take(self, change: Floats) -> None:
+        """Change the velocities, with the dashpots of the base, which act as those of a model."""
+        base = self._base
+        if base is None or np.isinf(base.impedances[0]):
+            end = 0.0 * change[0] if base is None else 2 * base.wave(self.time + 0.5 * self.dt)
+            change[0] = end - self.velocity[0]
+            self.velocity += self._gained(change)
+            self.velocity[0] = end
+            return
+        change[0] -= self.dt / self._nodal_mass[0] * self._moduli[0] / base.thickness * self._displacement
+        normal, shear = base.impedances
+        damping = np.array([shear] * (change.shape[1] - 1) + [normal])
         damping = np.where(damping > 0, damping, np.sqrt(self._density[0] * self._moduli[0]))
-        force = force - damping * (self.velocity[0] - incoming)
-        force -= self._moduli[0] / self._base.thickness * self._displacement
-        return force / (self._nodal_mass[0] + 0.5 * self.dt * damping)
+        mean = self.velocity[0] + 0.5 * self._gained(change)[0]
+        against = 2 * base.wave(self.time + 0.5 * self.dt) - mean
+        shared = self._own[0] / self._nodal_mass[0]  # part of an acceleration at the base that its particles take
+        change[0] += self.dt * damping * against / (self._nodal_mass[0] + 0.5 * shared * self.dt * damping)
+        self.velocity += self._gained(change)
+
+    def _gained(self, change: Floats) -> Floats:
+        """What the particles gain at the levels by changes of the velocities there."""
+        lower, upper = change[:-1], change[1:]
+        gained = self._to_levels(self._own * lower + self._coupled * upper, self._coupled * lower + self._own * upper)
+        return gained / self._nodal_mass[:, None]
 
     def _strain(self) -> None:
         increment = np.zeros_like(self.stress)
