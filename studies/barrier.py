@@ -232,6 +232,17 @@ def draw_force(path: Path, a: Namespace, history: History) -> None:
         axes.legend(loc="lower right")
 
 
+def flow_scene(a: Namespace, model: mpm.Model) -> Scene | None:
+    """The mesh for pictures, with the flow at the start, whose front is inclined and cuts cells. Collective."""
+    scene = scene_of(model, [bridge.BODY])
+    if scene is not None:
+        lower, upper = scene.initial_outline.min(axis=(0, 1)), scene.initial_outline.max(axis=(0, 1))
+        crest = upper - (a.depth / np.tan(np.radians(a.front_angle)), 0.0)
+        corners = np.array([lower, (upper[0], lower[1]), crest, (lower[0], upper[1])])
+        scene.initial_outline = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    return scene
+
+
 def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> Pictures:
     """The force, sand and wall in the end, and a film."""
     title = f"$t$ = {result.history['time_s'][-1]:.2f} s"
@@ -258,7 +269,7 @@ def main(arguments: list[str] | None = None) -> int:
     model = build(a)
     wall = model.contacts[0]
     result = follow(a, model, a.duration * passage(a), COLUMNS, partial(row, a, wall), folder, shown="force_factor")
-    history, scene = result.history, scene_of(model, [bridge.BODY])
+    history, scene = result.history, flow_scene(a, model)
     (_, fluid), (_, passive) = bores(a)
     force = full_force(a, history)
     results = {

@@ -60,6 +60,14 @@ def test_options_of_a_debris_flow_that_do_not_fit(options, message, capsys):
     assert message in capsys.readouterr().err
 
 
+def test_pictures_show_the_flow_at_the_start_with_its_inclined_front():
+    barrier = importlib.import_module("barrier")
+    a = barrier.parse("--cell-size 0.25 --particles-per-cell 6 --length 8 --front-angle 30".split())
+    model = barrier.build(a)
+    (x, y), (x_next, y_next) = np.moveaxis(barrier.flow_scene(a, model).initial_outline, (1, 2), (0, 1))
+    assert 0.5 * np.sum(x * y_next - x_next * y) == pytest.approx(model.particles.volume.sum(), rel=0.01)
+
+
 def test_forces_of_wall_and_plane_stop_the_flow(tmp_path):
     barrier = importlib.import_module("barrier")
     size = "--cell-size 0.25 --particles-per-cell 3 --length 5 --slope 15"
