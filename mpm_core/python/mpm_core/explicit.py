@@ -21,6 +21,7 @@ from .penetration import PenetrationWatch
 from .rayleigh import Rayleigh
 from .report import Report
 from .space import SpaceWatch, count_parts, swollen
+from .two_phase import of_suction
 
 if TYPE_CHECKING:
     from .model import Model
@@ -131,7 +132,7 @@ def run_explicit(
     energy = EnergyWatch(
         energy_limit,
         model.comm.rank == 0,
-        lambda generated: swollen(model) or advice,
+        lambda generated: swollen(model) or advice + (of_suction(model) if generated else ""),
         noisy=smooth,
         damped=run.pic == 0,
     )

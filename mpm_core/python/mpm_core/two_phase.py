@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ._core import InputError, Integration, StressUpdate
 from .rayleigh import Rayleigh
 
@@ -42,6 +44,17 @@ def _require_two_phases(model: Model, integration: Any, stress_update: Any, rayl
     for what, there in refused.items():
         if there:
             raise InputError(f"the model has pore water, expected an explicit run without {what}")
+
+
+def of_suction(model: Model) -> str:
+    """Text on suction as a cause of generated energy, to follow others; none where the pores bear no suction, or any."""
+    water = model._core.water
+    if water is None or not 0 < water.suction_limit < np.inf:
+        return ""
+    return (
+        f"; another cause is water that its suction_limit of {water.suction_limit:g} Pa draws in at the surface of soil that conducts well: "
+        "take suction_limit=0 there (docs/water.md)"
+    )
 
 
 def refuse_two_phases(model: Model, scheme: str) -> None:
