@@ -12,22 +12,55 @@ namespace mpm::model
 {
 namespace
 {
+/// Pore pressure without that of water that stands over the soil, and then effective stress, of the cells around a
+/// node: sums of both times the volumes of their soil.
+template <int D>
+using StressAround = std::array<double, 1 + n_symmetric<D>>;
+
+/// These sums of all nodes, over all ranks.
+/// @note Collective
+template <class G, int D = G::dim>
+std::vector<StressAround<D>> stress_around(Model<G>& model)
+{
+  const VelocityField<G>& soil = model.fields.front();
+  std::vector<StressAround<D>> nodes(soil.nodes.size(), StressAround<D>{});
+  for (Index c : soil.part.cells)
+  {
+    const double volume = soil.moments[c].volume;
+    if (volume == 0)
+      continue;
+    const CellShape<D>& shape = model.mesh.shapes[c];
+    const auto standing = standing_water(model.mesh, *model.water, c);
+    const Working<G> of_water = acting_stress(model.mesh, model.water_field.motion, c);
+    const Working<G> of_soil = acting_stress(model.mesh, soil, c);
+    const double pressure = -of_water[0] - pressure_at<D>(standing, shape_functions<D>(shape, shape.centre));
+    for (Index node : model.mesh.cells[c])
+    {
+      nodes[node][0] += volume * pressure;
+      for (int k = 0; k < n_symmetric<D>; ++k)
+        nodes[node][1 + k] += volume * of_soil[k];
+    }
+  }
+  sum_shared(model.exchange, nodes);
+  return nodes;
+}
+
 /// Fraction of the normal stress on a surface that the water of a cell carries, without that which stands over the
 /// soil.
-template <class G, int D = G::dim>
-double water_fraction(const Model<G>& model, Index cell, const Vector<D>& normal)
+template <int D>
+double water_fraction(const std::array<Index, D + 1>& cell, const std::vector<StressAround<D>>& nodes,
+                      const Vector<D>& normal)
 {
-  const CellShape<D>& shape = model.mesh.shapes[cell];
-  const auto standing = standing_water(model.mesh, *model.water, cell);
-  const Working<G> of_water = acting_stress(model.mesh, model.water_field.motion, cell);
-  const Working<G> of_soil = acting_stress(model.mesh, model.fields.front(), cell);
-  const double water = -of_water[0] - pressure_at<D>(standing, shape_functions<D>(shape, shape.centre));
-  double grains = 0;
-  for (int a = 0; a < D; ++a)
-    for (int b = 0; b < D; ++b)
-      grains -= normal[a] * of_soil[symmetric_index<D>(a, b)] * normal[b];
+  double water = 0, grains = 0;
+  for (Index node : cell)
+  {
+    water += nodes[node][0];
+    for (int a = 0; a < D; ++a)
+      for (int b = 0; b < D; ++b)
+        grains -= normal[a] * nodes[node][1 + symmetric_index<D>(a, b)] * normal[b];
+  }
   grains = std::max(grains, 0.0); // none where the soil is in tension
-  return water + grains > 0 ? std::min(1.0, water / (water + grains)) : 0;
+  return water + grains > 0 ? std::clamp(water / (water + grains), 0.0, 1.0) : 0;
 }
 
 /// Directions along which nodes are impervious.
@@ -63,7 +96,9 @@ void add_wet_contact_forces(Model<G>& model, double dt)
     return;
   VelocityField<G>& soil = model.fields.front();
   WaterField<G>& water = model.water_field;
-  const auto fraction = [&](Index cell, const Vector<D>& normal) { return water_fraction<G, D>(model, cell, normal); };
+  const auto around = stress_around<G, D>(model);
+  const auto fraction = [&](Index cell, const Vector<D>& normal)
+  { return water_fraction<D>(model.mesh.cells[cell], around, normal); };
   const Movers movers{model.field_of_law, 0};
   for (auto* forces : {&soil.contact_force, &water.motion.contact_force, &water.covered})
     forces->resize(soil.nodes.size());

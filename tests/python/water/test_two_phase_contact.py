@@ -70,6 +70,18 @@ def test_a_surface_rubs_by_the_effective_stress(base, nmd, conductivity):
     assert normal - shear / MU == pytest.approx(GAMMA, rel=0.1)
 
 
+@pytest.mark.parametrize("base", [0.06, 0.08])
+def test_a_surface_that_leaves_little_of_its_cells_rubs_by_the_effective_stress(base):
+    """Two fifths and a fifth; their triangles are not filled evenly."""
+    model, plane = column([4, 12], 0.1, base, base + 1.0, friction=MU, velocity=(0.1, 0.0))
+    model.add_water(porosity=POROSITY, conductivity=1e-2, modulus=2.2e7, suction_limit=0.0)
+    model.set_gravity((0.0, -GAMMA / WATER))
+    buoyant = (DENSITY / WATER - 1) * GAMMA
+    under(model, lambda y: GAMMA * (base + 1 - y), lambda y: buoyant * (base + 1 - y))
+    model.explicit(0.3, nmd=True, damping=0.2, energy_limit=None).last()  # hardly any energy is at work
+    assert -plane.force[0] / 0.4 == pytest.approx(MU * buoyant, rel=0.2)
+
+
 @pytest.mark.parametrize("nmd", [False, True])
 def test_no_water_leaves_at_a_surface_that_few_particles_touch(nmd):
     """Particles at random distances from a plane, of which the first ones carry the soil: between them the water rests, too."""
