@@ -73,3 +73,12 @@ def at_once(mesh, soils, laws, load, supports=ROLLERS, **options):
 
 def oedometer(soil):
     return YOUNG[soil] * (1 - POISSON) / ((1 + POISSON) * (1 - 2 * POISSON))
+
+
+IN_SITU = bridge.Stage("in situ", fill=SOILS["pit"], unit_weight=weights(SOILS["pit"]))
+DIG = [bridge.Stage("dig 1", excavate="pit 1"), bridge.Stage("dig 2", excavate="pit 2", pressure={"floor": 5e3})]
+
+
+def carried_out(site, *stages):
+    """Reports of the stages."""
+    return list(bridge.carry_out(site, stages))
