@@ -6,9 +6,9 @@ import sys
 import warnings
 from pathlib import Path
 
-import numpy as np
 import pytest
 from mpi4py import MPI
+from site_cases import SITE, site_in
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -16,44 +16,6 @@ import mpm_core as mpm
 ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT / "studies"))
 site_file = importlib.import_module("common.site_file")
-
-BLOCK = """
-SetFactory("OpenCASCADE");
-DefineConstant[ cell_size = 0.5 ];
-Rectangle(1) = {0, 0, 0, 1, 1}; Rectangle(2) = {0, 1, 0, 1, 1};
-Coherence;
-Physical Surface("lower") = {1}; Physical Surface("upper") = {2};
-e = 0.01;
-Physical Curve("base") = {Curve In BoundingBox{-e, -e, -e, 1 + e, e, e}};
-Physical Curve("left") = {Curve In BoundingBox{-e, -e, -e, e, 2 + e, e}};
-Mesh.MeshSizeMax = cell_size;
-"""
-WITH_AIR = """
-Rectangle(3) = {1, 0, 0, 2, 2};
-Coherence;
-Physical Surface("air") = {3};
-"""
-SITE = """
-mesh = "block.geo"
-cell_size = 0.5
-[soils.lower]
-unit_weight = 10e3
-material = "tresca"
-young = 5e6
-poisson = 0.45
-shear_strength = {value = 20e3, per_metre = 10e3, top = 2.0}
-[soils.upper]
-unit_weight = 18e3
-cohesion = 9e3
-friction_angle = 0.0
-young = 5e6
-"""
-
-
-def site_in(folder, text=SITE):
-    (folder / "block.geo").write_text(BLOCK)
-    (folder / "site.toml").write_text(text)
-    return folder / "site.toml"
 
 
 def test_a_site_has_its_laws_weights_and_supports(tmp_path):
@@ -262,50 +224,6 @@ def test_a_soil_that_the_site_does_not_have_cannot_keep_its_strength(tmp_path):
         importlib.import_module("safety").main([str(word) for word in options])
 
 
-def test_particles_give_a_second_opinion(tmp_path):
-    """Linear finite elements and particles on the same cells, of a site with room to move and of a slope."""
-    path = site_in(tmp_path, SITE)
-    (tmp_path / "block.geo").write_text(
-        BLOCK.replace("Coherence;", WITH_AIR).replace("-e, 1 + e, e, e}", "-e, 3 + e, e, e}")
-    )
-    for options in (
-        ["--site", path],
-        ["--cell-size", 0.2, "--crest", 1, "--unit-weight", 20e3, "--no-without-dilation"],
-    ):
-        folder = tmp_path / f"{len(options)}"
-        arguments = [*options, "--elements", "P1", "--meshes", 1, "--start", 0.7, "--particles", "--output", folder]
-        assert importlib.import_module("safety").main([str(word) for word in arguments]) == 0
-        summary = json.loads((folder / "summary.json").read_text())
-        assert summary["failure_shown_by_particles"]
-        assert summary["factor_of_safety_by_particles"] == pytest.approx(summary["factor_of_safety"], rel=0.02)
-
-
-def test_a_site_slides_when_its_strength_is_reduced(tmp_path):
-    """The upper metre, which stands free with 2 c / (gamma H) = 1, so with c = 9 kPa, has 36 kPa.
-
-    Divided by 1.2 nothing yields, and all stays where the elements had it; divided by 8 it falls, by the order of g t^2 / 2.
-    So it does with averaged strains, the default in such soil, since elements and particles average forces alike. The settlement
-    by hand is 18 kPa 2 m / M below, with the weight of 10 kN/m3 of this soil itself, and that of the upper metre.
-    """
-    slope, path = importlib.import_module("slope"), site_in(tmp_path, SITE.replace("9e3", "36e3"))
-    (tmp_path / "block.geo").write_text(
-        BLOCK.replace("Coherence;", WITH_AIR).replace("-e, 1 + e, e, e}", "-e, 3 + e, e, e}")
-    )
-    moved = {}
-    for factor, nmd in ((1.2, "--no-nmd"), (1.2, "--nmd"), (8.0, "")):
-        folder = tmp_path / f"{factor}{nmd}"
-        options = f"--site {path} --factor {factor} --time 0.4 --frames 4 --particles-per-cell 3 --no-pictures {nmd} --output {folder}"
-        assert slope.main(options.split()) == 0
-        summary = json.loads((folder / "summary.json").read_text())
-        assert summary["initial_out_of_balance_ratio"] < 1e-8 and summary["newly_yielded_fraction"] == 0
-        moved[factor, nmd] = summary["largest_displacement_m"]
-        assert (folder / "report.html").exists() and not list(folder.glob("*.png"))
-    lower, upper = (5e6 * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) for nu in (0.45, 0.3))
-    settlement = (18e3 * 2 + 10e3 * 2**2 / 2) / lower + 18e3 / 2 / upper
-    assert max(moved[1.2, "--no-nmd"], moved[1.2, "--nmd"]) < 1e-5 * settlement
-    assert 0.05 < moved[8.0, ""] < 9.81 / 2 * 0.4**2
-
-
 @pytest.mark.parametrize(
     "study",
     ["collapse", "consolidation", "drawdown", "embankment", "excavation", "rain", "safety", "seepage", "slope"],
@@ -318,98 +236,3 @@ def test_earlier_results_stay_where_the_site_has_a_mistake(tmp_path, study):
     with pytest.raises(mpm.InputError):
         importlib.import_module(study).main(["--site", str(path), "--output", str(folder), "--overwrite"])
     assert [file.name for file in folder.iterdir()] == ["summary.json"]
-
-
-@pytest.mark.parametrize("study", ["slope", "embankment"])
-def test_numerical_damping_hardly_brakes_the_slide_of_a_site(tmp_path, study):
-    """Both studies move a site as far as without any damping, to some percent, not by a part that depends on the study."""
-    stages = '[[stages]]\nname = "all"\nfill = ["lower", "upper"]\n'
-    path = site_in(tmp_path, SITE.replace("9e3", "36e3") + stages)
-    (tmp_path / "block.geo").write_text(
-        BLOCK.replace("Coherence;", WITH_AIR).replace("-e, 1 + e, e, e}", "-e, 3 + e, e, e}")
-    )
-    moved = []
-    for damping in ("", "--damping 0 --pic 0"):
-        folder = tmp_path / f"results{len(moved)}"
-        options = (
-            f"--site {path} --cell-size 0.25 --factor 8 --time 0.5 --frames 2 --no-pictures {damping} --output {folder}"
-        )
-        assert importlib.import_module(study).main(options.split()) == 0
-        history = np.genfromtxt(folder / "history.csv", delimiter=",", names=True)
-        moved.append(history["largest_displacement_m"][-1])
-    assert moved[1] > 0.2 and moved[0] == pytest.approx(moved[1], rel=0.05)
-
-
-def test_a_site_that_does_not_carry_its_weight_does_not_slide(tmp_path):
-    path = site_in(tmp_path, SITE.replace("9e3", "1e3"))
-    with pytest.raises(
-        mpm.InputError, match=r"site.toml: its soils carry [2-6]\d.\d% of their weight only: .*mechanism"
-    ):
-        importlib.import_module("slope").main(["--site", str(path), "--output", str(tmp_path / "results")])
-
-
-def test_elastic_soil_of_a_site_stays_as_it_is_when_strength_is_reduced(tmp_path):
-    elastic = 'material = "elastic"\nyoung = 5e6\npoisson = 0.25'
-    lines = (
-        'material = "tresca"\nyoung = 5e6\npoisson = 0.45\nshear_strength = {value = 20e3, per_metre = 10e3, top = 2.0}'
-    )
-    site = site_file.read_site(site_in(tmp_path, SITE.replace(lines, elastic)), MPI.COMM_WORLD)
-    lower, upper = site.weaker_laws(1.5)
-    assert isinstance(lower, mpm.LinearElastic) and lower.young == 5e6
-    assert upper.cohesion == pytest.approx(9e3 / 1.5)
-    folder = tmp_path / "results"
-    options = f"--site {tmp_path / 'site.toml'} --factor 1.2 --time 0.01 --frames 1 --particles-per-cell 3 --no-pictures --output {folder}"
-    assert importlib.import_module("slope").main(options.split()) == 0
-
-
-@pytest.mark.parametrize("nmd", ["--nmd", "--no-nmd"])
-def test_stages_of_the_embankment_average_strains_in_elements_as_in_particles(tmp_path, nmd):
-    """Sand on soil ten times as stiff, where averages change stresses by more than the largest of them; elements and particles agree."""
-    stages = '[[stages]]\nname = "ground"\nfill = "lower"\n[[stages]]\nname = "sand"\nfill = "upper"\n'
-    sand = SITE.replace("shear_strength = {value = 20e3, per_metre = 10e3, top = 2.0}", "cohesion = 1e6")
-    sand = sand.replace("friction_angle = 0.0\nyoung = 5e6", "friction_angle = 30.0\nyoung = 5e5").replace(
-        "9e3", "36e3"
-    )
-    path, folder = (
-        site_in(tmp_path, sand.replace('material = "tresca"', "friction_angle = 30.0") + stages),
-        tmp_path / "results",
-    )
-    options = (
-        f"--site {path} --factor 1 --time 0.01 --frames 1 --particles-per-cell 3 --no-pictures {nmd} --output {folder}"
-    )
-    assert importlib.import_module("embankment").main(options.split()) == 0
-    assert json.loads((folder / "summary.json").read_text())["stress_difference_of_particles_to_fem"] < 1e-4
-
-
-def test_particles_average_strains_as_elements_do_and_beside_quadratic_ones(tmp_path):
-    """Soil without friction: the factor is that of averaged elements on the same cells; without averages it is higher by a quarter."""
-    path = site_in(tmp_path, SITE.replace("cell_size = 0.5", "cell_size = 0.25"))
-    (tmp_path / "block.geo").write_text(
-        BLOCK.replace("Coherence;", WITH_AIR).replace("-e, 1 + e, e, e}", "-e, 3 + e, e, e}")
-    )
-    found = {}
-    for elements in ("P1-averaged", "P2"):
-        folder = tmp_path / elements
-        options = f"--site {path} --elements {elements} --meshes 1 --start 0.7 --particles --output {folder}"
-        assert importlib.import_module("safety").main(options.split()) == 0
-        found[elements] = json.loads((folder / "summary.json").read_text())
-    averaged = found["P1-averaged"]["factor_of_safety"]
-    for summary in found.values():
-        assert summary["factor_of_safety_by_particles"] == pytest.approx(averaged, rel=0.02)
-
-
-def test_pore_pressures_of_an_embankment_stay_in_space_as_it_slides(tmp_path):
-    """Soil that falls into the water gets its uplift, 9.81 kN/m3."""
-    stages = '[[stages]]\nname = "all"\nfill = ["lower", "upper"]\nwater_level = 1.0\n'
-    site = site_file.read_site(site_in(tmp_path, SITE + stages), MPI.COMM_WORLD)
-    embankment = importlib.import_module("embankment")
-    particles, failed = embankment.build(site, 3, 1.0, False)
-    assert failed is None
-    p, act = particles.model.particles, embankment.pore_water(particles)
-    above = p.position[:, 1] > 1.0
-    assert abs(p.traction[above]).max() == 0 and p.traction[~above, 1].sum() == pytest.approx(9810.0)
-    particles.model.remove(~above)
-    particles.model.place(p.position - [0.0, 1.0])
-    assert p.traction[:, 1].sum() == 0
-    act()
-    assert p.traction[:, 1].sum() == pytest.approx(9810.0)
