@@ -1,11 +1,17 @@
 """Studies by their functions `main`, in the process of the test."""
 
+import contextlib
 import importlib
 import importlib.util
+import io
 import os
 import subprocess
 import sys
+import warnings
 from pathlib import Path
+from typing import NamedTuple
+
+import mpm_core as mpm
 
 STUDIES = Path(__file__).parents[2] / "studies"
 sys.path.insert(0, str(STUDIES))
@@ -35,3 +41,30 @@ def main(name, arguments):
         return module.main([str(word) for word in arguments])
     finally:
         sys.argv[0] = program
+
+
+class Ended(NamedTuple):
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def ended(name, folder, *options):
+    """How a study ends and what it says, as its script does (`common.ranks.run_study`), which takes a second more to start."""
+    files = importlib.import_module("common.files")
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), warnings.catch_warnings():
+        for kind in (UserWarning, RuntimeWarning):
+            warnings.simplefilter("default", kind)
+        warnings.showwarning = lambda text, *_, **__: print(f"warning: {text}", file=err)
+        files.NOT_WRITTEN.clear()
+        try:
+            code = main(name, ["--output", folder, *options])
+        except SystemExit as end:
+            code = end.code
+        except (mpm.InputError, mpm.RunError, files.OutputError) as error:
+            print(error, file=err)
+            code = 2
+        for reason in files.NOT_WRITTEN:
+            print(reason, file=err)
+    return Ended(code or (1 if files.NOT_WRITTEN else 0), out.getvalue(), err.getvalue())

@@ -1,19 +1,10 @@
 """The studies of laws: element tests from the command line, the slope of other soils, and retrogression, all small."""
 
 import json
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-STUDIES = Path(__file__).parents[3] / "studies"
-
-
-def study(name, folder, *options):
-    command = [sys.executable, str(STUDIES / f"{name}.py"), "--output", str(folder), *options]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300)
+from study_main import ended
 
 
 def summary(folder):
@@ -22,7 +13,7 @@ def summary(folder):
 
 def test_drained_triaxial_test_ends_at_the_strength(tmp_path):
     # sigma_1 = N sigma_3 + 2 c sqrt(N), N = (1 + sin phi) / (1 - sin phi) = 3 for 30 degrees
-    result = study("element_test", tmp_path, "--test", "drained", "--friction-angle", "30", "--cohesion", "5e3",
+    result = ended("element_test", tmp_path, "--test", "drained", "--friction-angle", "30", "--cohesion", "5e3",
                    "--pressure", "20e3", "--young", "2e6")  # fmt: skip
     assert result.returncode == 0, result.stderr
     assert summary(tmp_path)["q_Pa"] == pytest.approx(2 * 20e3 + 2 * 5e3 * 3**0.5, rel=1e-9)
@@ -33,7 +24,7 @@ def test_undrained_triaxial_test_of_cam_clay_ends_at_the_critical_state(tmp_path
     # By water that is stiff, and by constant volume: q = M p', p' = p_c/2 (2 p_0/p_c)^(kappa/lambda) from p_0 = p_c
     for k, options in enumerate((["--test", "undrained"], ["--undrained", "--water-modulus", "2e9"])):
         clay = ["--material", "cam-clay", "--attraction", "0", "--preconsolidation", "20e3", "--pressure", "20e3"]
-        result = study("element_test", tmp_path / str(k), *clay, *options)
+        result = ended("element_test", tmp_path / str(k), *clay, *options)
         assert result.returncode == 0, result.stderr
         end = summary(tmp_path / str(k))
         assert end["p_Pa"] == pytest.approx(10e3 * 2 ** (0.02 / 0.1), rel=1e-2)
@@ -55,7 +46,7 @@ def test_undrained_triaxial_test_of_loose_nor_sand_ends_at_its_residual_strength
         "1.2",
     ]
     options = ["--test", "undrained", "--strain", "1", "--steps", "2000"]
-    result = study("element_test", tmp_path, *sand, *options)
+    result = ended("element_test", tmp_path, *sand, *options)
     assert result.returncode == 0, result.stderr
     end, history = summary(tmp_path), np.genfromtxt(tmp_path / "history.csv", delimiter=",", names=True)
     residual = 1e3 * np.exp((1.0 - 0.99) / 0.03)
@@ -78,7 +69,7 @@ def test_viscous_soil_in_simple_shear_has_the_stress_of_its_rate(tmp_path):
         "5e3",
     ]
     for rate in (0.01, 1.0):
-        result = study("element_test", tmp_path / str(rate), *mud, "--strain", "2", "--rate", str(rate))
+        result = ended("element_test", tmp_path / str(rate), *mud, "--strain", "2", "--rate", str(rate))
         assert result.returncode == 0, result.stderr
         assert summary(tmp_path / str(rate))["shear_stress_Pa"] == pytest.approx(2e3 + 5e3 * rate, rel=1e-6)
 
@@ -93,7 +84,7 @@ def test_a_law_of_ones_own(tmp_path):
         "            for k in range(stress.shape[1]):\n"
         "                tangent[:, k, k] = 1e6\n"
     )
-    result = study(
+    result = ended(
         "element_test", tmp_path / "out", "--python-law", f"{tmp_path / 'mine.py'}:Spring", "--pressure", "0"
     )
     assert result.returncode == 0, result.stderr
@@ -108,7 +99,7 @@ def test_a_law_of_ones_own(tmp_path):
      (["--rate", "1"], "--rate is given, expected --material viscoplastic")],
 )  # fmt: skip
 def test_bad_options_are_named(tmp_path, options, named):
-    result = study("element_test", tmp_path, *options)
+    result = ended("element_test", tmp_path, *options)
     assert result.returncode == 2
     assert named in result.stderr
 
@@ -120,7 +111,7 @@ SMALL_BANK = (
 
 
 def test_retrogression_starts_in_equilibrium_and_yields_on_two_meshes(tmp_path):
-    result = study("retrogression", tmp_path, *SMALL_BANK, "--meshes", "two")
+    result = ended("retrogression", tmp_path, *SMALL_BANK, "--meshes", "two")
     assert result.returncode == 0, result.stderr
     found = summary(tmp_path)["cells"]
     assert set(found) == {"1_m", "0.5_m"}
@@ -138,7 +129,7 @@ def test_a_bank_of_resting_cells_fails_back_as_one_of_particles(tmp_path):
     # The damping keeps apart how the bank begins to fail from the noise of its foremost particle, by which run-outs differ.
     damped, found = ("--pic", "0.1", "--damping", "0.05"), []
     for name, more in (("particles", []), ("coupled", ["--coupled"])):
-        result = study(
+        result = ended(
             "retrogression", tmp_path / name, *SMALL_BANK, *more, *damped, "--meshes", "one", "--no-pictures"
         )
         assert result.returncode == 0, result.stderr
@@ -163,7 +154,7 @@ def test_a_bank_of_resting_cells_fails_back_as_one_of_particles(tmp_path):
     ],
 )
 def test_quantities_in_other_units_are_warned_of(tmp_path, options, words):
-    result = study("element_test", tmp_path, "--steps", "5", *options)
+    result = ended("element_test", tmp_path, "--steps", "5", *options)
     assert result.returncode == 0 and words in result.stderr
     assert result.stderr.count("warning: ") == bool(words)
 

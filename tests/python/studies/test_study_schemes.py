@@ -1,18 +1,13 @@
 """The slope by the implicit and the quasi-static scheme, and both schemes side by side."""
 
 import json
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
-
-STUDIES = Path(__file__).parents[3] / "studies"
+from study_main import ended
 
 
 def study(name, folder, *options):
-    command = [sys.executable, str(STUDIES / f"{name}.py"), "--output", str(folder), *options]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    result = ended(name, folder, *options)
     summary = folder / "summary.json"
     return result, json.loads(summary.read_text()) if summary.exists() else None
 
