@@ -1,5 +1,6 @@
 """What tests of several files need."""
 
+import importlib
 import shutil
 import signal
 import subprocess
@@ -31,3 +32,9 @@ def small_disk(tmp_path, request):
         pytest.skip("needs the right to mount a file system")
     yield disk
     subprocess.run(["umount", disk], check=True)
+
+
+@pytest.fixture
+def without_pictures(monkeypatch):
+    """Studies in the process of the test draw neither figures nor films: for tests that read numbers only."""
+    monkeypatch.setattr(importlib.import_module("common.summary"), "draw_pictures", lambda pictures: None)

@@ -133,6 +133,7 @@ def _history(folder, *names):
         return np.transpose([[float(row[name]) for name in names] for row in csv.DictReader(file)])
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_loads_in_stages_settle_as_the_sum_of_olsons_ramps(tmp_path):
     """Rise, pause, rise, pause, and a part that is taken away at once; from the command line, by elements and particles."""
     import consolidation
@@ -165,6 +166,7 @@ poisson = 0.3
 """
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_layers_that_are_placed_in_stages_settle_the_clay_below_as_their_weights_do(tmp_path):
     import consolidation
 

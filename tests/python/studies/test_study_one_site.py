@@ -15,6 +15,7 @@ import mpm_core as mpm
 
 ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT / "studies"))
+pytestmark = pytest.mark.usefixtures("without_pictures")
 DIKE = ROOT / "meshes" / "dike.toml"
 SMALL = {
     "collapse": "--meshes 1",

@@ -121,6 +121,7 @@ release = "left"
 """
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_stages_that_are_left_out_are_named(tmp_path):
     options = ["--site", site_in(tmp_path, SITE + STAGES), "--meshes", 1, "--output", tmp_path / "collapse"]
     said = "left out: water_level of 'in situ', excavate of 'cut', unit_weight of 'cut', release of 'cut'; the study safety"
@@ -130,6 +131,7 @@ def test_stages_that_are_left_out_are_named(tmp_path):
     assert site_file.read_site(site_in(tmp_path, placed), MPI.COMM_SELF).left_out_at_once() == ""
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_the_factor_of_safety_is_that_after_the_last_stage(tmp_path):
     """Ground far below a water level has the factor of dry ground under its buoyant weight: water at rest presses on all sides.
 
@@ -173,6 +175,7 @@ def test_stages_are_placed_at_once_on_a_new_site_only(tmp_path):
         once.place(site.stages)
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_results_keep_the_file_of_the_site_as_it_was(tmp_path):
     path = site_in(tmp_path, SITE.replace("cell_size = 0.5", "cell_size = 1.0  # coarse"))
     text, options = path.read_text(), ["--site", str(path), "--meshes", "1", "--output", str(tmp_path / "results")]
@@ -183,6 +186,7 @@ def test_results_keep_the_file_of_the_site_as_it_was(tmp_path):
     assert (tmp_path / "results" / "site.toml").read_text() == path.read_text()
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_the_cell_size_of_a_site_may_be_given_beside_it(tmp_path):
     path = site_in(tmp_path, SITE)
     options = ["--site", path, "--cell-size", 1.0, "--meshes", 1]
@@ -193,6 +197,7 @@ def test_the_cell_size_of_a_site_may_be_given_beside_it(tmp_path):
     assert importlib.import_module("slope").parse(["--site", str(path), "--cell-size", "2.5"]).cell_size == 2.5
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_soil_of_a_site_may_keep_its_strength(tmp_path):
     """More strength never lowers the factor of soils that flow without a change of volume, by limit analysis."""
     path, factors = site_in(tmp_path, SITE.replace("cell_size = 0.5", "cell_size = 1.0")), {}

@@ -17,6 +17,7 @@ sys.path.insert(0, str(ROOT / "studies"))
 site_file = importlib.import_module("common.site_file")
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_particles_give_a_second_opinion(tmp_path):
     """Linear finite elements and particles on the same cells, of a site with room to move and of a slope."""
     path = site_in(tmp_path, SITE)
@@ -116,6 +117,7 @@ def test_stages_of_the_embankment_average_strains_in_elements_as_in_particles(tm
     assert json.loads((folder / "summary.json").read_text())["stress_difference_of_particles_to_fem"] < 1e-4
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_particles_average_strains_as_elements_do_and_beside_quadratic_ones(tmp_path):
     """Soil without friction: the factor is that of averaged elements on the same cells; without averages it is higher by a quarter."""
     path = site_in(tmp_path, SITE.replace("cell_size = 0.5", "cell_size = 0.25"))
