@@ -117,7 +117,7 @@ def test_soil_as_heavy_as_water_has_no_effective_stress_under_it(gravity, scheme
 
 def test_water_takes_part_in_a_ramp_of_gravity_and_in_its_changes():
     """A level holds, whenever gravity is set: before or after it, or as it rises in a centrifuge."""
-    model = column(0.0, conductivity=1.0)
+    model = column(0.0)
     model.hold_pore_pressure(TOP, level=2.0)
     model.set_gravity((0.0, -490.5), ramp=1e5)
     for part in (0.5, 1.0, 1.2):
