@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from time import process_time
 from typing import NamedTuple
@@ -37,8 +38,9 @@ class Found(NamedTuple):
     seconds: float
 
 
+@cache
 def mesh_of(name: str, divisions: int) -> tuple:
-    """A mesh of ``meshes/`` by its name: domain, cell tags, facet tags."""
+    """A mesh of ``meshes/`` by its name: domain, cell tags, facet tags. Made once, for all runs on it; collective."""
     return bridge.read_mesh(MESHES / f"{name}.geo", comm, parameters={"divisions": divisions})
 
 
