@@ -21,14 +21,14 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 
-@pytest.fixture
-def pit(tmp_path):
-    return mesh_of("pit", tmp_path)
+@pytest.fixture(scope="module")
+def pit(tmp_path_factory):
+    return mesh_of("pit", tmp_path_factory.mktemp("pit"))
 
 
-@pytest.fixture
-def column(tmp_path):
-    return mesh_of("column", tmp_path)
+@pytest.fixture(scope="module")
+def column(tmp_path_factory):
+    return mesh_of("column", tmp_path_factory.mktemp("column"))
 
 
 def there_of(points):
@@ -82,8 +82,9 @@ def test_a_support_taken_away_leaves_the_body_without_it(pit):
     assert_same(site.fem, at_once(pit, SOILS["pit"], laws, load, [ROLLERS[0], ROLLERS[2]]))
 
 
-def test_one_of_several_sides_of_a_support_is_released(pit):
+def test_one_of_several_sides_of_a_support_is_released(tmp_path):
     """Rollers at "sides" of which one goes are the roller at the other; 1e-9, as if there had been two supports."""
+    pit = mesh_of("pit", tmp_path)  # of its own, whose boundaries are given a new name
     domain, cell_tags, facet_tags = pit
     names = bridge.names_of(facet_tags)
     bridge.name_tags(facet_tags, {**names, "sides": names["left"] + names["right"]})

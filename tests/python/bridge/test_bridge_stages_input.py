@@ -8,14 +8,14 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 
-@pytest.fixture
-def pit(tmp_path):
-    return mesh_of("pit", tmp_path)
+@pytest.fixture(scope="module")
+def pit(tmp_path_factory):
+    return mesh_of("pit", tmp_path_factory.mktemp("pit"))
 
 
-@pytest.fixture
-def column(tmp_path):
-    return mesh_of("column", tmp_path)
+@pytest.fixture(scope="module")
+def column(tmp_path_factory):
+    return mesh_of("column", tmp_path_factory.mktemp("column"))
 
 
 @pytest.mark.parametrize(
