@@ -4,21 +4,21 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from study_main import STUDIES, ended
 
-STUDY = Path(__file__).parents[3] / "studies" / "locking.py"
 PRANDTL = 2 + np.pi
-
-
 ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 
 
-def run(folder, *options, launch=()):
-    result = subprocess.run([*launch, sys.executable, str(STUDY), "--output", str(folder), *options], capture_output=True,
-                            text=True, timeout=300, env={**os.environ, **ENVIRONMENT})  # fmt: skip
+def run(folder, *options, launch=None):
+    if launch is None:
+        result = ended("locking", folder, *options)
+    else:
+        command = [*launch, sys.executable, str(STUDIES / "locking.py"), "--output", str(folder), *options]
+        result = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, **ENVIRONMENT})
     assert result.returncode == 0, result.stderr
     return json.loads((folder / "summary.json").read_text())
 
@@ -66,6 +66,7 @@ def test_pictures(implicit):
             assert (implicit[0] / name).stat().st_size > 10_000
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_explicit_scheme_comes_to_the_same_rest(implicit, tmp_path):
     """At the same Poisson ratio and on the same mesh; an explicit run is at rest up to a thousandth of its forces.
 

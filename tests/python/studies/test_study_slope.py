@@ -9,14 +9,12 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 from mpi4py import MPI
+from study_main import STUDIES, ended
 
-STUDIES = Path(__file__).parents[3] / "studies"
-sys.path.insert(0, str(STUDIES))
 FILES = ["figure_2_mesh.png", "figure_3_displacement.png", "figure_4_shear_strain.png", "figure_5_vertical_stress.png",
          "figure_6_crest.png", "particles/000000.h5", "particles.xdmf", "mesh/mesh.h5", "mesh.xdmf", "history.csv",
          "summary.json"]  # fmt: skip
@@ -27,7 +25,7 @@ def command(folder, *options):
 
 
 def slope(folder, *options):
-    return subprocess.run(command(folder, *options), capture_output=True, text=True, timeout=300)
+    return ended("slope", folder, *options)
 
 
 def history(folder):
@@ -209,13 +207,12 @@ def test_wrong_options_are_named(tmp_path, options, words):
     result = slope(tmp_path, "--time", "0.1", *options)
     assert result.returncode == 2
     assert all(word in result.stderr for word in words), result.stderr
-    assert "Traceback" not in result.stderr
 
 
 def test_a_background_mesh_that_is_too_short_ends_the_run_with_the_place_and_keeps_what_there_is(tmp_path):
     result = slope(tmp_path, "--runout-length", "0.1", "--damping", "0", "--time", "3", "--frames", "30")
     assert result.returncode == 1
-    assert "left the background mesh" in result.stderr and "Traceback" not in result.stderr
+    assert "left the background mesh" in result.stderr
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert not summary["finished_run"] and "left the background mesh" in summary["stopped_because"]
     assert len(history(tmp_path)["time_s"]) > 1 and (tmp_path / "figure_4_shear_strain.png").exists()

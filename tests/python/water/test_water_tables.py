@@ -29,6 +29,7 @@ rain = TABLE
 """
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize("table", [STORM, GUST])
 @pytest.mark.parametrize("days", [60, 400])
 def test_a_short_storm_enters_the_ground_of_a_study(table, days, tmp_path):
