@@ -121,7 +121,7 @@ def test_plastic_slope_does_not_depend_on_the_number_of_ranks(dilation_angle, op
     results = []
     for comm in (COMM, MPI.COMM_SELF):
         solver = bridge.Solver(tolerance=1e-12)
-        model = slope_model(dilation_angle=dilation_angle, comm=comm, solver=solver, **options)
+        model = slope_model(0.2, dilation_angle=dilation_angle, comm=comm, solver=solver, **options)
         model.solve(bridge.Load(unit_weight=18e3))
         assert model.converged
         values = model.evaluate_at(points)
@@ -199,14 +199,19 @@ def assert_same_hand_over(results, absolute):
 
 
 @pytest.mark.parametrize(
-    ("degree", "cell_size", "options"),
-    [(2, 0.1, {}), (2, 0.05, {"smooth": True}), (1, 0.1, {"move": True}), (2, 0.05, {"move": True})],
+    ("degree", "fem_size", "cell_size", "options"),
+    [
+        (2, 0.1, 0.1, {}),
+        (2, 0.2, 0.1, {"smooth": True}),
+        (1, 0.1, 0.1, {"move": True}),
+        (2, 0.2, 0.1, {"move": True}),
+    ],
 )
-def test_hand_over_between_different_partitions(degree, cell_size, options):
+def test_hand_over_between_different_partitions(degree, fem_size, cell_size, options):
     """Alone or shared, particles get the same from the finite elements, and come into equilibrium."""
     results = []
     for comm in (COMM, MPI.COMM_SELF):
-        fem = slope_model(dilation_angle=0.0, degree=degree, comm=comm)
+        fem = slope_model(fem_size, dilation_angle=0.0, degree=degree, comm=comm)
         fem.solve(bridge.Load(unit_weight=18e3))
         model = slope_particles(18e3, cell_size=cell_size, comm=comm)
         report = bridge.initialise(model, fem, equilibrate=False, **options)
@@ -214,7 +219,7 @@ def test_hand_over_between_different_partitions(degree, cell_size, options):
             assert report.unbalanced_ratio < 1e-10 and report.returned_fraction == 0
         results.append((report.unbalanced_ratio, handed_over(model, comm)))
     assert_same_hand_over(results, 1e-10)
-    fem = slope_model(dilation_angle=0.0, degree=degree)
+    fem = slope_model(fem_size, dilation_angle=0.0, degree=degree)
     fem.solve(bridge.Load(unit_weight=18e3))
     report = bridge.initialise(slope_particles(18e3, cell_size=cell_size), fem, **options)
     assert report.equilibrated_ratio < 1e-3 and report.yielded_fraction < 0.01

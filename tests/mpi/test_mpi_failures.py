@@ -84,7 +84,7 @@ def singular_tangent(case):
 
 
 def body(case, law):
-    soil, _, facet_tags = bridge.soil_mesh(*bridge.slope_mesh(case.comm, cell_size=0.1))
+    soil, _, facet_tags = bridge.soil_mesh(*bridge.slope_mesh(case.comm, cell_size=0.2))
     supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
     return bridge.QuasiStatic(soil, law, facet_tags, supports, degree=1)
 
