@@ -24,6 +24,12 @@ from common.slope_fem import slope_fem, weight  # noqa: E402
 import fenics_bridge as bridge  # noqa: E402
 
 
+@pytest.fixture
+def without_pictures(monkeypatch):
+    """Studies draw neither figures nor films, for which ranks wait: of tests that read numbers only."""
+    monkeypatch.setattr("common.summary.draw_pictures", lambda pictures: None)
+
+
 def summary_of(study, folder, *options):
     assert study.main(["--output", str(folder), *options]) == 0
     MPI.COMM_WORLD.barrier()
@@ -48,6 +54,7 @@ def test_factor_of_safety_is_that_of_one_rank(shared_path):
     assert (shared_path / "mechanism.png").exists()
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize("move", [False, True])
 def test_hand_overs_of_the_study(shared_path, monkeypatch, move):
     monkeypatch.setattr(handover, "FRACTIONS", (0.9,))
@@ -58,6 +65,7 @@ def test_hand_overs_of_the_study(shared_path, monkeypatch, move):
     assert 0.01 < row["crest_displacement_m"] < 0.2
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_particles_differ_from_quadratic_elements_as_linear_ones_do(shared_path, monkeypatch):
     """At rest, in the cells in which they began, particles are linear finite elements."""
     monkeypatch.setattr(compare_fem, "UNIT_WEIGHTS", (10e3,))
