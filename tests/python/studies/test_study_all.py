@@ -37,7 +37,7 @@ SMALL = {
     "runout": "--cell-size 16 --spacing 8 --thickness 12 --time 0.5 --frames 2",
     "safety": "--cell-size 0.5 --meshes 1 --elements P1 --no-without-dilation --start 0.9",
     "scaling": "--side-2d 4 --side-3d 2 --steps 2",
-    "seepage": "--cell-size 2 --days 20 --frames 2",
+    "seepage": "--cell-size 4 --days 20 --frames 2",
     "slope": "--time 0.1 --frames 2 --mesh fitted --cell-size 0.5 --particles-per-cell 1",
     "slope_schemes": "--time 0.1 --frames 2 --mesh fitted --cell-size 0.5 --particles-per-cell 1 " "--longer-steps 1",
     "wall": "--cell-size 0.25 --particles-per-cell 1 --speed 0.05 --frames 2",
