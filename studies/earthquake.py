@@ -18,7 +18,6 @@ from common.animation import save_animation
 from common.checks import check_cells, check_effect, check_file, check_whole
 from common.earthquake_plots import save_amplification, save_ground, save_motions, save_record
 from common.earthquake_site import (
-    STEP,
     STIFF,
     column_layers,
     damping_of,
@@ -32,7 +31,8 @@ from common.figures import Pictures
 from common.followed import FollowedNodes, cells_near, mean_displacement, numbers_in
 from common.history import History
 from common.lengths import metres
-from common.motions import accelerations, noise_band, ricker
+from common.motion_options import add_motion_options, check_motion
+from common.motions import STEP, accelerations, ricker
 from common.movie import gathered, own_frame, particle_movie
 from common.newmark import sliding_block, yield_acceleration
 from common.options import add_choice, add_count, add_number, check, study_parser
@@ -53,8 +53,6 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
-HIGHEST = 1 / (4 * STEP)
-"""Highest frequency in spectra of the history, whose steps are twice those of the motion [Hz]"""
 COLUMNS = [
     "time_s", "crest_velocity_m_per_s", "crest_level_velocity_m_per_s", "toe_level_velocity_m_per_s",
     "foot_velocity_m_per_s", "slope_displacement_m", "free_field_displacement_m",
@@ -79,26 +77,7 @@ def parser() -> ArgumentParser:
     add_soil_options(p, dilation_angle=0.0)
     p.set_defaults(young=200e6, poisson=0.3, cohesion=25e3, friction_angle=20.0)
     add_number(p, "--stiff-young", 800e6, "Pa", "Young's modulus of the stiffer layer, which stays elastic", above=0)
-    add_number(p, "--rock-density", 2400.0, "kg/m3", "density of the rock below", above=0)
-    add_number(p, "--rock-speed", 1000.0, "m/s", "speed of shear waves in the rock", above=0)
-    add_choice(p, "--motion", "noise", ("noise", "ricker"), "synthetic motion of the outcrop")
-    p.add_argument("--accelerogram", type=Path, default=None, metavar="FILE",
-                   help="file of the outcrop's motion, time [s] and acceleration, in place of a synthetic one")  # fmt: skip
-    add_choice(p, "--unit", "m/s2", ("m/s2", "cm/s2", "g"), "unit of the accelerations in that file")
-    add_number(p, "--peak", 4.0, "m/s2", "largest acceleration of a synthetic motion", above=0)
-    add_number(
-        p,
-        "--frequency",
-        2.0,
-        "Hz",
-        "frequency of the Ricker wavelet, or twice the lowest one of the noise",
-        above=0,
-    )
-    add_number(p, "--highest-frequency", 6.0, "Hz", "highest frequency of the noise", above=0)
-    add_number(p, "--duration", 8.0, "s", "duration of a synthetic motion", above=0)
-    add_count(p, "--seed", 1, "seed of the random numbers of the noise")
-    add_number(p, "--rest", 3.0, "s", "time that is computed after the motion", at_least=0)
-    add_number(p, "--damping-ratio", 0.02, "-", "damping ratio of the soil at small strains", at_least=0, below=0.5)
+    add_motion_options(p)
     add_count(p, "--frames", 40, "times at which particles are drawn")
     add_picture_options(p)
     return p
@@ -135,30 +114,6 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     )
     check_motion(p, a)
     return a
-
-
-def check_motion(p: ArgumentParser, a: Namespace) -> None:
-    """End with an error where the options of the motion do not fit together."""
-    check_file(p, a.accelerogram, "--accelerogram")
-    synthetic = a.accelerogram is None
-    check_effect(p, a, not synthetic, ("--unit",), "--accelerogram")
-    check_effect(p, a, synthetic, ("--motion", "--peak", "--duration", "--seed"), "no --accelerogram")
-    check_effect(p, a, a.motion == "noise", ("--highest-frequency", "--seed"), "--motion noise")
-    band = 0.5 * a.frequency, a.highest_frequency
-    check(p, a.motion != "noise" or band[0] < band[1],
-          lambda: f"--highest-frequency is {band[1]:g} Hz, expected above the lowest frequency of the noise (half of "
-                  f"--frequency, {band[0]:g} Hz)")  # fmt: skip
-    name, most = ("--highest-frequency", HIGHEST) if a.motion == "noise" else ("--frequency", HIGHEST / 2)
-    value = a.highest_frequency if a.motion == "noise" else a.frequency
-    check(p, value <= most,
-          lambda: f"{name} is {value:g} Hz, expected at most {most:g} Hz: steps of {2 * STEP:g} s have spectra up to {HIGHEST:g} Hz"
-                  + ", and a Ricker wavelet has energy up to twice its frequency" * (a.motion == "ricker"))  # fmt: skip
-    check(p, a.motion != "ricker" or a.duration >= 3 / a.frequency,
-          lambda: f"--duration is {a.duration:g} s, expected at least {3 / a.frequency:g} s, three periods of --frequency, which a "
-                  "Ricker wavelet takes")  # fmt: skip
-    check(p, a.motion != "noise" or not synthetic or noise_band(band, a.duration, STEP)[1].any(),
-          lambda: f"--duration is {a.duration:g} s, in which noise of steps of {STEP:g} s has no frequency from {band[0]:g} to "
-                  f"{band[1]:g} Hz; expected a longer one, or other values of --frequency and --highest-frequency")  # fmt: skip
 
 
 # --- 2. The earthquake -----------------------------------------------------------------------------------------------

@@ -13,15 +13,13 @@ import mpm_core as mpm
 from fenics_bridge import compat
 
 from .followed import FollowedNodes
-from .motions import as_motion, band_limited_noise, ricker
+from .motions import STEP, as_motion, band_limited_noise, ricker
 from .quiet import NOT_REACHED, without_warning
 from .slope_case import GRAVITY
 
 comm = MPI.COMM_WORLD
 STIFF = 3
 """Cell tag of the lower layer"""
-STEP = 0.01
-"""Time step of synthetic motions [s]"""
 
 
 def outcrop_motion(a: Namespace) -> tuple[np.ndarray, np.ndarray, mpm.Motion]:

@@ -6,6 +6,9 @@ import numpy as np
 
 import mpm_core as mpm
 
+STEP = 0.01
+"""Time step of synthetic motions [s]"""
+
 
 def ricker(frequency: float, peak: float, duration: float, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Ricker's wavelet as acceleration, with its peak after 1.5 periods.

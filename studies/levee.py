@@ -1,0 +1,215 @@
+"""A levee on sand that liquefies in an earthquake: pore pressures, settlement of the crest, spreading of the toes.
+
+The levee stands on loose saturated sand over stiffer ground, with the water table at the surface of the ground. Finite elements
+give the equilibrium. In the earthquake the motion of a rock outcrop enters through the base, which absorbs outgoing waves; free
+fields are coupled to the sides. The sand has the law SANISAND and does not drain meanwhile. The ground stays in resting cells,
+which move with their nodes as finite elements do. That the sand settles as its water drains afterwards is not computed.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from common.animation import save_animation
+from common.checks import check_cells
+from common.earthquake_plots import save_ground, save_record
+from common.earthquake_site import outcrop_motion
+from common.figures import Pictures
+from common.followed import cells_near, mean_displacement, numbers_in
+from common.history import History
+from common.lengths import metres
+from common.levee_plots import save_liquefaction
+from common.levee_site import SOILS, damping_of, effective_pressure, loose_sand, model_in_equilibrium
+from common.motion_options import add_motion_options, check_motion
+from common.motions import STEP, accelerations
+from common.movie import gathered, own_frame, particle_movie
+from common.options import add_count, add_number, check, study_parser
+from common.output_options import add_picture_options
+from common.page import Page
+from common.plots import DISPLACEMENT, SHEAR_STRAIN, Quantity
+from common.progress import Progress
+from common.ranks import run_study
+from common.results import open_results
+from common.scenes import scene_of
+from common.schemes import add_particles_per_cell
+from common.slope_case import add_soil_options
+from common.summary import write_summary
+from mpi4py import MPI
+
+import mpm_core as mpm
+
+comm = MPI.COMM_WORLD
+RATIO = Quantity("Excess pore pressure ratio $1 - p'/p'_0$ of the sand", "-", colours="viridis")
+COLUMNS = [
+    "time_s", "crest_settlement_m", "spreading_of_toes_m",
+    "pore_pressure_ratio_free_field", "pore_pressure_ratio_below_toe", "pore_pressure_ratio_below_crest",
+]  # fmt: skip
+"""The toes move apart; pore pressures are at the middle of the sand"""
+PLACES = ("free_field", "below_toe", "below_crest")
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """Parser of all options; the help shows their units."""
+    p = study_parser(__doc__)
+    add_number(p, "--height", 4.0, "m", "height of the levee", above=0)
+    add_number(p, "--slope", 2.0, "-", "horizontal length of the slopes of the levee over their height", at_least=0.5)
+    add_number(p, "--crest", 4.0, "m", "width of the crest", above=0)
+    add_number(p, "--sand-depth", 6.0, "m", "thickness of the sand", above=0)
+    add_number(p, "--stiff-depth", 4.0, "m", "thickness of the stiffer ground", above=0)
+    add_number(p, "--beside", 24.0, "m", "length of the ground beside each toe", above=0)
+    add_number(p, "--cell-size", 1.0, "m", "edge of the triangles", above=0)
+    add_particles_per_cell(p, 3)
+    add_number(p, "--void-ratio", 0.85, "-", "void ratio of the sand", above=0)
+    p.add_argument("--sanisand", nargs="*", default=[], metavar="NAME=VALUE",
+                   help="parameters of the sand that differ from those of Toyoura sand, such as dilatancy=0.5")  # fmt: skip
+    add_number(p, "--unit-weight", 18e3, "N/m3", "unit weight of the levee", above=0)
+    add_soil_options(p, dilation_angle=0.0)
+    p.set_defaults(young=40e6, poisson=0.3, cohesion=10e3, friction_angle=32.0)
+    add_number(p, "--stiff-young", 400e6, "Pa", "Young's modulus of the stiffer ground, which stays elastic", above=0)
+    add_motion_options(p)
+    p.set_defaults(peak=2.0, rest=2.0)
+    add_count(p, "--frames", 40, "times at which the ground is drawn")
+    add_picture_options(p)
+    return p
+
+
+def parse(arguments: list[str] | None = None) -> Namespace:
+    p = parser()
+    a = p.parse_args(arguments)
+    for name in ("height", "sand_depth", "stiff_depth", "beside"):
+        check(p, a.cell_size <= 0.5 * getattr(a, name),
+              lambda name=name: f"--cell-size is {a.cell_size:g} m, expected at most half of --{name.replace('_', '-')}")  # fmt: skip
+    length = 2 * a.beside + 2 * a.slope * a.height + a.crest
+    check_cells(p, a, 2.3 * length * (a.height + a.sand_depth + a.stiff_depth) / a.cell_size**2, "--cell-size", "--beside",
+                "--sand-depth", "--stiff-depth")  # fmt: skip
+    check_motion(p, a)
+    loose_sand(a)  # names what is wrong with its parameters
+    return a
+
+
+# --- 2. The earthquake -----------------------------------------------------------------------------------------------
+
+
+class Followed:
+    """Soil that the history follows: crest, toes, and sand in the free field, below a toe and below the crest. Collective."""
+
+    def __init__(self, model: mpm.Model, a: Namespace) -> None:
+        left, right = a.beside, a.beside + 2 * a.slope * a.height + a.crest
+        middle, reach, depth = 0.5 * (left + right), 1.5 * a.cell_size, -0.5 * a.sand_depth
+
+        def near(x: float, y: float, soil: str) -> np.ndarray:
+            return numbers_in(model, cells_near(model, np.array((x, y)), reach, model.mesh.tags_of("cell", soil)))
+
+        self._model = model
+        self._crest = near(middle, a.height, "levee")
+        self._toes = near(left, 0.0, "sand"), near(right, 0.0, "sand")
+        self._sand = [near(x, depth, "sand") for x in (0.25 * a.beside, left, middle)]
+        self._start = [self._pressure(numbers) for numbers in self._sand]
+
+    def _pressure(self, numbers: np.ndarray) -> float:
+        rows = np.isin(self._model.particles.id, numbers)
+        total, count = comm.allreduce(np.array([effective_pressure(self._model)[rows].sum(), rows.sum()]))
+        return float(total / count)
+
+    def row(self, time: float) -> dict[str, float]:
+        """Values of the columns."""
+        left, right = (mean_displacement(self._model, toe)[0] for toe in self._toes)
+        ratios = [1 - self._pressure(numbers) / start for numbers, start in zip(self._sand, self._start)]
+        settled = -mean_displacement(self._model, self._crest)[1]
+        return dict(zip(COLUMNS, (time, settled, right - left, *ratios)))
+
+
+def shaken(a: Namespace, model: mpm.Model, until: float, folder: Path) -> tuple[History, list, mpm.Report]:
+    """Run to the end; history, frames and the last report."""
+    followed, start = Followed(model, a), effective_pressure(model)
+    frames, samples = [frame_at(model, start, 0.0)], max(a.frames, round(until / (2 * STEP)))
+    run = model.explicit(until, every=until / samples, rayleigh=damping_of(a), nmd=True, conversion=None)
+    with History(folder / "history.csv", COLUMNS, comm) as history, Progress("levee", until, comm) as progress:
+        history.add(**followed.row(0.0))
+        for k, report in enumerate(run, 1):
+            row = followed.row(report.time)
+            history.add(**row)
+            if k * a.frames // samples > (k - 1) * a.frames // samples:
+                frames.append(frame_at(model, start, report.time))
+            progress.show(report.time, report.steps, settlement=metres(row["crest_settlement_m"]))
+    return history, frames, report
+
+
+def frame_at(model: mpm.Model, start: np.ndarray, time: float) -> dict | None:
+    """Gather all rows to the first rank, None on the others; cells are at their present places. Collective."""
+    p = model.particles
+    frame = own_frame(model, time)
+    frame["position"] = (p.position + p.displacement).astype(np.float32)
+    corners = model.mesh.points[model.mesh.cells[p.cell]].reshape(-1, 6) + np.tile(p.displacement, 3)
+    ratio = np.where(p.material == len(SOILS), np.clip(1 - effective_pressure(model) / start, 0.0, 1.0), 0.0)
+    more = {
+        "resting": np.ones(len(p), np.float32),
+        "corners": corners.astype(np.float32),
+        "ratio": ratio.astype(np.float32),
+    }
+    return gathered(model.comm, {**frame, **more})
+
+
+# --- 3. What comes out -----------------------------------------------------------------------------------------------
+
+
+def drawn(a: Namespace, folder: Path, record: tuple, history: History, frames: list, scene: object) -> Pictures:
+    """Draw all pictures and the film, on the first rank."""
+    if scene is None:
+        return {}
+    last = frames[-1]
+    pictures = {
+        "record": partial(save_record, folder / "record.png", record[0], record[1], record[2].velocity),
+        "liquefaction": partial(save_liquefaction, folder / "liquefaction.png", history),
+        "pore_pressure": partial(save_ground, folder / "pore_pressure.png", last, "ratio", RATIO),
+        "displacement": partial(save_ground, folder / "displacement.png", last, "displacement", DISPLACEMENT),
+        "shear_strain": partial(save_ground, folder / "shear_strain.png", last, "shear_strain", SHEAR_STRAIN),
+    }  # fmt: skip
+    if a.film:
+        pictures["levee"] = partial(save_animation, folder / "levee", scene, frames, "ratio", RATIO)
+    return pictures
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = parse(arguments)
+    record = outcrop_motion(a)
+    folder = open_results(a, comm)
+    model = model_in_equilibrium(a, record[2])
+    until = float(record[2].time[-1]) + a.rest
+    history, frames, report = shaken(a, model, until, folder)
+    largest = {
+        f"largest_pore_pressure_ratio_{place}": history[f"pore_pressure_ratio_{place}"].max() for place in PLACES
+    }
+    summary = {
+        "crest_settlement_m": history["crest_settlement_m"][-1],
+        "spreading_of_toes_m": history["spreading_of_toes_m"][-1],
+        **largest,
+        "largest_acceleration_of_outcrop_m_per_s2": np.abs(accelerations(record[2].time, record[2].velocity)[1]).max(),
+        "unexplained_energy_fraction": report.unexplained_fraction,
+        "steps": report.steps,
+    }  # fmt: skip
+    captions = {
+        "record": "Motion of the outcrop, as recorded and after the baseline correction",
+        "liquefaction": "Excess pore pressures in the middle of the sand, settlement of the crest and spreading of the toes",
+        "pore_pressure": "Excess pore pressure ratio at the end",
+        "displacement": "Displacement that stays", "shear_strain": "Plastic shear strain at the end",
+    }  # fmt: skip
+    scene = scene_of(model, model.mesh.tags_of("cell", SOILS))
+    page = Page(movies=[particle_movie("levee", scene, frames)], captions=captions)
+    pictures = drawn(a, folder, record, history, frames, scene) if a.pictures else {}
+    said = (
+        f"crest settled by {metres(summary['crest_settlement_m'])}, toes spread by {metres(summary['spreading_of_toes_m'])}; largest "
+        f"excess pore pressure ratio {largest['largest_pore_pressure_ratio_free_field']:.2f} in the free field, "
+        f"{largest['largest_pore_pressure_ratio_below_crest']:.2f} below the crest"
+    )
+    return write_summary(folder, a, summary, comm, page, pictures, said)
+
+
+if __name__ == "__main__":
+    run_study(main)

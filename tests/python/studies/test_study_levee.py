@@ -1,0 +1,58 @@
+"""The study levee: loose sand liquefies beside the levee, which settles; dense sand carries it."""
+
+import json
+
+import numpy as np
+import pytest
+from study_main import ended
+
+SMALL = [
+    "--cell-size", "2", "--beside", "12", "--motion", "ricker", "--frequency", "1.5", "--peak", "3", "--duration", "2", "--rest", "0.5",
+    "--frames", "2", "--no-pictures",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def of(tmp_path_factory):
+    """Summary and history of a small earthquake for sand of a void ratio; each is computed once."""
+    known = {}
+
+    def run(void_ratio):
+        if void_ratio not in known:
+            folder = tmp_path_factory.mktemp(f"levee_{void_ratio}")
+            result = ended("levee", folder, *SMALL, "--void-ratio", str(void_ratio))
+            assert result.returncode == 0, result.stderr
+            summary = json.loads((folder / "summary.json").read_text())
+            known[void_ratio] = summary, np.genfromtxt(folder / "history.csv", delimiter=",", names=True)
+        return known[void_ratio]
+
+    return run
+
+
+def test_loose_sand_liquefies_beside_the_levee_and_not_below_its_crest(of):
+    summary, history = of(0.88)
+    assert summary["largest_pore_pressure_ratio_free_field"] > 0.85
+    assert summary["largest_pore_pressure_ratio_below_crest"] < 0.4
+    assert summary["crest_settlement_m"] > 0.02 and summary["spreading_of_toes_m"] > 0.02
+    settlement = history["crest_settlement_m"]
+    assert abs(settlement[0]) < 1e-12 and settlement[history["time_s"] < 0.2].max() < 1e-3  # it begins at rest
+    assert summary["unexplained_energy_fraction"] < 0.01
+
+
+def test_dense_sand_carries_the_levee(of):
+    loose, dense = (of(void_ratio)[0] for void_ratio in (0.88, 0.65))
+    assert dense["crest_settlement_m"] < 0.5 * loose["crest_settlement_m"]
+    assert dense["spreading_of_toes_m"] < 0.5 * loose["spreading_of_toes_m"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--cell-size", "3"], "--cell-size is 3 m, expected at most half of --height"),
+        (["--sanisand", "dilatency=1"], "did you mean dilatancy?"),
+        (["--highest-frequency", "0.5"], "--highest-frequency is 0.5 Hz, expected above the lowest frequency"),
+    ],
+)
+def test_wrong_options_are_named(tmp_path, options, message):
+    result = ended("levee", tmp_path, *options)
+    assert result.returncode == 2 and message in result.stderr, result.stderr
