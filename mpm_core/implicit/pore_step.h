@@ -77,6 +77,8 @@ struct PoreStep
   std::vector<unsigned char> held;   ///< per node: 1 where its pressure is prescribed
   std::vector<double> prescribed;    ///< that pressure [Pa]
   std::vector<double> content;       ///< water that the soil takes up less what flows to it [m3], over all ranks
+  double flow_squares = 0; ///< of each owned cell: square of the water that the pressures of its nodes drive to and fro
+                           ///< in the balance of `content`, where they nearly cancel [m6]
 };
 
 /// Water that a gradient drives through the soil of a cell, against another one: g . f h.

@@ -114,20 +114,25 @@ void find_water_balance(const Mesh<D>& mesh, NodeExchange& exchange, const Veloc
   if (!pore.flows)
     return;
   pore.content.assign(mesh.points.size(), 0.0);
+  pore.flow_squares = 0;
   for (Index c : step.cells)
   {
     const PoreCell<D>& cell = pore.cells[c];
     const auto& nodes = mesh.cells[c];
     const Vector<D> drive = driving_gradient(mesh, field, step, c);
     const double dilation = volume_strain(mesh, field, step.dt, c);
+    double conductance = 0, pressure = 0;
     for (int k = 0; k <= D; ++k)
     {
+      conductance += flow<D>(flux_of(pore, c), mesh.shapes[c].gradient[k], mesh.shapes[c].gradient[k]);
+      pressure = std::max(pressure, std::abs(end_pressure(pore, nodes[k], step.dt)));
       double& content = pore.content[nodes[k]];
       content += pore.drying.empty() ? cell.mean[k] * dilation : pore.drying[c].content[k];
       content += flow<D>(flux_of(pore, c), mesh.shapes[c].gradient[k], drive);
       for (int l = 0; l <= D; ++l)
         content += cell.capacity[k][l] * step.dt * pore.rate[nodes[l]];
     }
+    pore.flow_squares += conductance * conductance * pressure * pressure;
   }
   add_surface_content(mesh, step, pore.content);
   add_ghost_content(step, pore.content);

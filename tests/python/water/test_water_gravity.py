@@ -294,3 +294,14 @@ def test_soil_that_has_dried_may_be_as_light_as_its_water_leaves_it():
     model.set_pore_pressure(-20e3)  # S = (1 + 20^2)^(-1/2) = 0.05, so that 70 kg/m3 remain
     assert np.all(model.particles.mass / model.particles.volume < 100.0)
     settle(model)
+
+
+@pytest.mark.parametrize("conductivity", [1e-3, 1e-2, 1.0])
+def test_long_steps_converge_at_once_where_water_flows_far(conductivity):
+    """What is left of the balance of the water is round-off of what the pressures of nodes drive to and fro in a step."""
+    model = column(9.81, conductivity=conductivity)
+    model.hold_pore_pressure(TOP, level=1.0)
+    reports = list(model.implicit(5e4, dt=1e4, quasi_static=True, small_displacements=True))
+    assert len(reports) == 5 and max(report.iterations for report in reports) <= 3
+    depth = 1.0 - model.particles.position[:, 1]
+    assert model.particles.pore_pressure == pytest.approx(9810.0 * depth, rel=1e-8)
