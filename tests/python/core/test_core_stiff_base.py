@@ -75,7 +75,9 @@ def test_free_fields_on_a_stiff_base_keep_the_amplitude_of_a_steady_motion(imped
         cell_size=[1.0] * CELLS, coupled_mass=[1 / 6] * CELLS, normal=[1.0, 0.0], time=0.0, water=[4e8] * CELLS,
     )  # fmt: skip
     time = np.linspace(0, 12, 4801)
-    base = Base((impedance,) * 2, 200.0, time, 0.1 * np.sin(4 * np.pi * time) * np.minimum(1, time), np.array([0.6, 0.8]))
+    base = Base(
+        (impedance,) * 2, 200.0, time, 0.1 * np.sin(4 * np.pi * time) * np.minimum(1, time), np.array([0.6, 0.8])
+    )
     column = GroundColumn(layers, [LAW], base, mpm.Rayleigh(0.0, 0.0))
     largest = np.zeros(12)
     while column.time < 12:

@@ -161,7 +161,7 @@ def test_quantities_in_other_units_are_warned_of(tmp_path, options, words):
 
 def test_cycles_of_sand_between_two_stresses(tmp_path):
     sand = ["--material", "sanisand", "--sanisand", "void_ratio=0.85", "attraction=0", "--pressure", "100e3"]
-    result = study("element_test", tmp_path, "--test", "cyclic-shear", *sand, "--stress-ratio", "0.15", "--cycles", "8")
+    result = ended("element_test", tmp_path, "--test", "cyclic-shear", *sand, "--stress-ratio", "0.15", "--cycles", "8")
     assert result.returncode == 0, result.stderr
     end, history = summary(tmp_path), np.genfromtxt(tmp_path / "history.csv", delimiter=",", names=True)
     largest, pressure = history["shear_stress_Pa"], history["p_Pa"]
@@ -187,5 +187,5 @@ def test_cycles_of_sand_between_two_stresses(tmp_path):
     ],
 )
 def test_wrong_options_of_sand_and_cycles_are_named(tmp_path, options, message):
-    result = study("element_test", tmp_path, "--material", "sanisand", *options)
+    result = ended("element_test", tmp_path, "--material", "sanisand", *options)
     assert result.returncode == 2 and message in result.stderr, result.stderr
