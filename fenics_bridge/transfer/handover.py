@@ -105,7 +105,7 @@ def initialise(
             (`Model.add_water`) take their pore pressures too, from a `water.Consolidation` or from a `QuasiStatic` with prescribed
             ones, without suction where they have retention curves, and `equilibrate` keeps these. Particles of `Undrained` laws,
             whose skeletons are the laws of a `QuasiStatic` with prescribed pore pressures, take total stresses, and the pressures
-            as their `excess_pore_pressure`.
+            as their `excess_pore_pressure`; particles of other laws may lie beside them where there are no pore pressures.
         count_displacement: let displacements of particles include those of the finite elements; otherwise they start from zero.
         move: move particles with the body, by its displacement; otherwise they stay where they are, with their volume.
             Volumes of particles that move change with the body's, and are then fitted to what each cell of their mesh holds

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 import mpm_core as mpm
 from fenics_bridge import compat
+from fenics_bridge.errors import agree
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.fem.fields import cell_function
 from fenics_bridge.fem.quasi_static import QuasiStatic
@@ -29,28 +30,22 @@ def skeleton_of(law: Any) -> Any:
 def takes_pore_pressure(model: mpm.Model, fem: Any) -> bool:
     """Whether particles take the pore pressures that are prescribed to finite elements. Collective.
 
-    They do as pore water (`Model.add_water`), or where all of them follow `Undrained`, as part of their total stress.
+    They do as pore water (`Model.add_water`), or as part of their total stress where they follow `Undrained`.
     """
     if not _are_prescribed(fem) or _has_undrained(fem):
         return False
-    undrained, used = _undrained(model)
-    return model._core.water is not None or undrained == used
+    return model._core.water is not None or bool(_undrained(model))
 
 
 def prescribed_mistake(model: mpm.Model, fem: Any) -> str | None:
     """Why particles cannot take the pore pressures that are prescribed to finite elements, in words; None if they can. Collective."""
     if not _are_prescribed(fem):
         return None
-    water, suction, (undrained, used) = model._core.water, fem.largest_suction(), _undrained(model)
+    water, suction = model._core.water, fem.largest_suction()
     if water is not None and water.may_dry and suction > 1e-9 * fem.largest_pore_pressure():
         return (
             f"fem is a QuasiStatic with suction of up to {suction:.4g} Pa that acts on the soil, expected none or a "
             "water.Consolidation, since particles have retention curves, by which suction acts in part only and water is missing"
-        )
-    if water is None and undrained and undrained != used and not _has_undrained(fem):
-        return (
-            f"the laws of materials {sorted(undrained)} are Undrained and those of {sorted(used - undrained)} are not, expected "
-            "all or none: particles take the pore pressures of fem as parts of total stresses, or not at all"
         )
     return None
 
@@ -63,10 +58,10 @@ def _has_undrained(fem: QuasiStatic) -> bool:
     return any(isinstance(law, mpm.Undrained) for law in fem.laws)
 
 
-def _undrained(model: mpm.Model) -> tuple[set[int], set[int]]:
-    """Numbers of those laws of the particles that are `Undrained`, and of all that particles have. Collective."""
+def _undrained(model: mpm.Model) -> set[int]:
+    """Numbers of those laws of the particles that are `Undrained`. Collective."""
     used = set().union(*model.comm.allgather(set(np.unique(model.particles.material).tolist())))
-    return {number for number in used if isinstance(model.laws[number], mpm.Undrained)}, used
+    return {number for number in used if isinstance(model.laws[number], mpm.Undrained)}
 
 
 def set_pore_pressure(model: mpm.Model, pressure: Function, search: PointSearch) -> None:
@@ -82,14 +77,31 @@ def add_to_stress(
     """Make total stresses of the effective ones of undrained particles, in place, and keep the pressures as their states.
 
     Collective. The pressure is the mean of the cell, like the stress, unless `smooth`.
+
+    Raises:
+        InputError: particles of other laws are under pore pressures. Raised on all ranks alike, before anything changes.
     """
     water = fem._water if smooth else cell_function(fem.domain, ufl.as_vector([fem._water]), 0, "pore_pressure")
     pressure = search.values(water)[:, 0]
+    agree(model.comm, _drained_mistake(model, pressure, 1e-6 * fem.largest_pore_pressure()))
     for number, law in enumerate(model.laws):
         if isinstance(law, mpm.Undrained):
             rows = model.particles.material == number
             stress[rows, :3] -= pressure[rows, None]
             state[rows, law.state_names.index(EXCESS)] = pressure[rows]
+
+
+def _drained_mistake(model: mpm.Model, pressure: NDArray[Any], least: float) -> str | None:
+    """What is wrong with particles under pore pressures [Pa] that do not follow `Undrained`; None where there are none."""
+    undrained = [isinstance(law, mpm.Undrained) for law in model.laws]
+    rows = ~np.array(undrained)[model.particles.material] & (np.abs(pressure) > least)
+    if not rows.any():
+        return None
+    return (
+        f"the laws of materials {np.unique(model.particles.material[rows]).tolist()} are not Undrained, but there are pore pressures "
+        f"of {np.abs(pressure[rows]).max():.4g} Pa in fem where their particles are; expected Undrained laws, as other particles "
+        "have, or no pore pressures there"
+    )
 
 
 def stands_on_surface(fem: QuasiStatic) -> bool:

@@ -172,11 +172,28 @@ def test_suction_that_is_prescribed_is_refused_where_particles_may_dry(seeping):
     assert bridge.initialise(model, fem, equilibrate=False).unbalanced_ratio < 1e-9
 
 
-def test_particles_of_which_some_are_undrained_are_refused(seeping):
+def above(model, height):
+    """Number 1 for particles of cells above a height, else 0."""
+    centres = model.mesh.points[model.mesh.cells].mean(axis=1)
+    return (centres[model.particles.cell, 1] > height).astype(int)
+
+
+def test_drained_soil_above_the_water_table_stays_drained():
+    fem, background = bank(lambda x: np.maximum(below_two_metres(x), 0.0))
+    model = particles(background, [UNDRAINED, SOIL])
+    model.assign(above(model, 2.0))
+    result, said = handed_over(model, fem)
+    assert result.unbalanced_ratio < 1e-10 and said == []
+    pressure = model.state("excess_pore_pressure")
+    assert np.isnan(pressure[model.particles.material == 1]).all() and np.nanmax(pressure) > 15e3
+
+
+def test_drained_soil_under_pore_pressures_is_refused_beside_undrained_soil(seeping):
     fem, background = seeping
     model = particles(background, [UNDRAINED, SOIL])
-    model.assign((model.particles.position[:, 1] > 2.0).astype(int))
+    model.assign(above(model, 1.0))
     with pytest.raises(
-        mpm.InputError, match=r"materials \[0\] are Undrained and those of \[1\] are not, expected all or none"
+        mpm.InputError, match=r"materials \[1\] are not Undrained, but there are pore pressures of .* Pa in fem"
     ):
         bridge.initialise(model, fem)
+    assert not model.particles.stress.any()
