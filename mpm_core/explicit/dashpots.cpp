@@ -90,12 +90,13 @@ void prepare_dashpots(Model<G>& model)
   for (DashpotNode<D>& entry : field.dashpots)
   {
     entry.response = sum[entry.node][0]; // the mass until it is found
-    change[entry.node][0] += entry.area / entry.response;
+    if (entry.response > 0) // some soil is there
+      change[entry.node][0] += entry.area / entry.response;
   }
   std::ranges::fill(sum, Vector<D>{});
   add_gained_momentum<G>(model, field, water, change, sum);
   for (DashpotNode<D>& entry : field.dashpots)
-    entry.response = sum[entry.node][0] / (entry.response * change[entry.node][0]);
+    entry.response = entry.response > 0 ? sum[entry.node][0] / (entry.response * change[entry.node][0]) : 1;
 }
 
 template <class G>
