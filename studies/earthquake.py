@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from common.animation import save_animation
-from common.checks import check_cells, check_effect, check_file, check_whole
+from common.checks import check_cells, check_two_cells, check_whole
 from common.earthquake_plots import save_amplification, save_ground, save_motions, save_record
 from common.earthquake_site import (
     STIFF,
@@ -35,7 +35,7 @@ from common.motion_options import add_motion_options, check_motion
 from common.motions import STEP, accelerations, ricker
 from common.movie import gathered, own_frame, particle_movie
 from common.newmark import sliding_block, yield_acceleration
-from common.options import add_choice, add_count, add_number, check, study_parser
+from common.options import add_count, add_number, check, study_parser
 from common.output_options import add_picture_options
 from common.page import Page
 from common.plots import DISPLACEMENT, SHEAR_STRAIN
@@ -94,10 +94,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check(p, a.dilation_angle <= a.friction_angle,
           lambda: f"--dilation-angle is {a.dilation_angle:g}, expected at most --friction-angle, "
                   f"{a.friction_angle:g} degrees")  # fmt: skip
+    check_two_cells(p, a, ("height", "soil_depth", "stiff_depth"))
     for name in ("height", "soil_depth", "stiff_depth"):
-        check(p, a.cell_size <= 0.5 * getattr(a, name),
-              lambda name=name: f"--cell-size is {a.cell_size:g} m, "
-                                f"expected at most half of --{name.replace('_', '-')}")  # fmt: skip
         check_whole(p, getattr(a, name) / a.cell_size, lambda name=name: f"--cell-size is {a.cell_size:g} m, expected "
                     f"--{name.replace('_', '-')}, {getattr(a, name):g} m, over a whole number")  # fmt: skip
     depth = a.height + a.soil_depth + a.stiff_depth

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from common.animation import save_animation
-from common.checks import check_cells
+from common.checks import check_cells, check_two_cells
 from common.earthquake_plots import save_ground, save_record
 from common.earthquake_site import outcrop_motion
 from common.figures import Pictures
@@ -26,7 +26,7 @@ from common.levee_site import SOILS, damping_of, effective_pressure, loose_sand,
 from common.motion_options import add_motion_options, check_motion
 from common.motions import STEP, accelerations
 from common.movie import gathered, own_frame, particle_movie
-from common.options import add_count, add_number, check, study_parser
+from common.options import add_count, add_number, study_parser
 from common.output_options import add_picture_options
 from common.page import Page
 from common.plots import DISPLACEMENT, SHEAR_STRAIN, Quantity
@@ -82,9 +82,7 @@ def parser() -> ArgumentParser:
 def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     a = p.parse_args(arguments)
-    for name in ("height", "sand_depth", "stiff_depth", "beside"):
-        check(p, a.cell_size <= 0.5 * getattr(a, name),
-              lambda name=name: f"--cell-size is {a.cell_size:g} m, expected at most half of --{name.replace('_', '-')}")  # fmt: skip
+    check_two_cells(p, a, ("height", "sand_depth", "stiff_depth", "beside"))
     length = 2 * a.beside + 2 * a.slope * a.height + a.crest
     check_cells(p, a, 2.3 * length * (a.height + a.sand_depth + a.stiff_depth) / a.cell_size**2, "--cell-size", "--beside",
                 "--sand-depth", "--stiff-depth")  # fmt: skip

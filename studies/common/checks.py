@@ -34,6 +34,13 @@ def check_whole(parser: argparse.ArgumentParser, cells: float, message: Callable
     check(parser, abs(cells - round(cells)) <= 1e-4 * cells, message)
 
 
+def check_two_cells(parser: argparse.ArgumentParser, options: argparse.Namespace, names: Sequence[str]) -> None:
+    """End with an error where a length, by its name among the options, is shorter than two cells."""
+    for name in names:
+        check(parser, options.cell_size <= 0.5 * getattr(options, name),
+              lambda name=name: f"--cell-size is {options.cell_size:g} m, expected at most half of --{name.replace('_', '-')}")  # fmt: skip
+
+
 def check_file(parser: argparse.ArgumentParser, path: Path | None, name: str) -> None:
     """End with an error when an option names a file that is not there."""
     check(parser, path is None or path.is_file(), lambda: f"{name} is {path}, but there is no such file")
