@@ -90,7 +90,7 @@ void prepare_dashpots(Model<G>& model)
   for (DashpotNode<D>& entry : field.dashpots)
   {
     entry.response = sum[entry.node][0]; // the mass until it is found
-    if (entry.response > 0) // some soil is there
+    if (entry.response > 0)              // some soil is there
       change[entry.node][0] += entry.area / entry.response;
   }
   std::ranges::fill(sum, Vector<D>{});
