@@ -18,6 +18,7 @@ from common.animation import save_animation
 from common.checks import check_cells, check_two_cells, check_whole
 from common.earthquake_plots import save_amplification, save_ground, save_motions, save_record
 from common.earthquake_site import (
+    FIELDS,
     STIFF,
     column_layers,
     damping_of,
@@ -48,6 +49,7 @@ from common.site_response import amplification, spectral_ratio
 from common.slope_case import GRAVITY, add_soil_options
 from common.summary import write_summary
 from mpi4py import MPI
+from mpm_core.output import ModelOutput
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -127,7 +129,12 @@ def shaken(a: Namespace, model: mpm.Model, until: float, folder: Path) -> tuple[
     level = numbers_in(model, cells_near(model, np.array((0.0, 0.0)), 1.5 * a.cell_size, [bridge.SOIL]))
     frames, samples = [frame_at(model, 0.0)], max(a.frames, round(until / (2 * STEP)))
     run = model.explicit(until, every=until / samples, rayleigh=damping_of(a), nmd=True)
-    with History(folder / "history.csv", COLUMNS, comm) as history, Progress("earthquake", until, comm) as progress:
+    with (
+        History(folder / "history.csv", COLUMNS, comm) as history,
+        Progress("earthquake", until, comm) as progress,
+        ModelOutput(model, folder / "particles", folder / "mesh", FIELDS) as files,
+    ):
+        files.write()
         history.add(**dict.fromkeys(COLUMNS, 0.0))
         for k, report in enumerate(run, 1):
             velocity = nodes.velocity()[:, 0]
@@ -135,6 +142,7 @@ def shaken(a: Namespace, model: mpm.Model, until: float, folder: Path) -> tuple[
             history.add(**dict(zip(COLUMNS, (report.time, *velocity, *moved))))
             if k * a.frames // samples > (k - 1) * a.frames // samples:
                 frames.append(frame_at(model, report.time))
+                files.write()
             progress.show(report.time, report.steps, displacement=metres(moved[0] - moved[1]))
     return history, frames, report
 

@@ -16,7 +16,7 @@ import numpy as np
 from common.animation import save_animation
 from common.checks import check_cells, check_two_cells
 from common.earthquake_plots import save_ground, save_record
-from common.earthquake_site import outcrop_motion
+from common.earthquake_site import FIELDS, outcrop_motion
 from common.figures import Pictures
 from common.followed import cells_near, mean_displacement, numbers_in
 from common.history import History
@@ -38,6 +38,7 @@ from common.schemes import add_particles_per_cell
 from common.slope_case import add_soil_options
 from common.summary import write_summary
 from mpi4py import MPI
+from mpm_core.output import ModelOutput
 
 import mpm_core as mpm
 
@@ -128,13 +129,19 @@ def shaken(a: Namespace, model: mpm.Model, until: float, folder: Path) -> tuple[
     followed, start = Followed(model, a), effective_pressure(model)
     frames, samples = [frame_at(model, start, 0.0)], max(a.frames, round(until / (2 * STEP)))
     run = model.explicit(until, every=until / samples, rayleigh=damping_of(a), nmd=True, conversion=None)
-    with History(folder / "history.csv", COLUMNS, comm) as history, Progress("levee", until, comm) as progress:
+    with (
+        History(folder / "history.csv", COLUMNS, comm) as history,
+        Progress("levee", until, comm) as progress,
+        ModelOutput(model, folder / "particles", folder / "mesh", (*FIELDS, "state")) as files,
+    ):
+        files.write()
         history.add(**followed.row(0.0))
         for k, report in enumerate(run, 1):
             row = followed.row(report.time)
             history.add(**row)
             if k * a.frames // samples > (k - 1) * a.frames // samples:
                 frames.append(frame_at(model, start, report.time))
+                files.write()
             progress.show(report.time, report.steps, settlement=metres(row["crest_settlement_m"]))
     return history, frames, report
 

@@ -20,6 +20,8 @@ from .slope_case import GRAVITY
 comm = MPI.COMM_WORLD
 STIFF = 3
 """Cell tag of the lower layer"""
+FIELDS = ("displacement", "velocity", "stress", "plastic_strain", "volume", "resting")
+"""Of particles and resting cells in the files for ParaView"""
 
 
 def outcrop_motion(a: Namespace) -> tuple[np.ndarray, np.ndarray, mpm.Motion]:
