@@ -47,7 +47,9 @@ def laws_at_rest(a: Namespace) -> dict[str, object]:
     """Laws of effective stresses by which the equilibrium is found; the sand has a friction angle instead of cycles."""
     elastic = {"young": a.young, "poisson": a.poisson}
     return {
-        "levee": mpm.MohrCoulomb(**elastic, cohesion=a.cohesion, friction_angle=a.friction_angle),
+        "levee": mpm.MohrCoulomb(
+            **elastic, cohesion=a.cohesion, friction_angle=a.friction_angle, dilation_angle=a.dilation_angle
+        ),
         "sand": mpm.MohrCoulomb(**elastic, cohesion=2e3, friction_angle=33.0),
         "stiff": mpm.LinearElastic(young=a.stiff_young, poisson=a.poisson),
     }

@@ -1,5 +1,6 @@
 """The study levee: loose sand liquefies beside the levee, which settles; dense sand carries it."""
 
+import importlib
 import json
 
 import numpy as np
@@ -43,6 +44,20 @@ def test_dense_sand_carries_the_levee(of):
     loose, dense = (of(void_ratio)[0] for void_ratio in (0.88, 0.65))
     assert dense["crest_settlement_m"] < 0.5 * loose["crest_settlement_m"]
     assert dense["spreading_of_toes_m"] < 0.5 * loose["spreading_of_toes_m"]
+
+
+def test_the_levee_has_the_strength_of_its_options():
+    options = "--cohesion 8e3 --friction-angle 30 --dilation-angle 4 --young 50e6 --poisson 0.25".split()
+    law = importlib.import_module("common.levee_site").laws_at_rest(importlib.import_module("levee").parse(options))[
+        "levee"
+    ]
+    assert (law.cohesion, law.friction_angle, law.dilation_angle, law.young, law.poisson) == (
+        8e3,
+        30.0,
+        4.0,
+        50e6,
+        0.25,
+    )
 
 
 @pytest.mark.parametrize(
