@@ -84,19 +84,18 @@ void prepare_dashpots(Model<G>& model)
     water->beside_dashpots = part_beside<G>(model.mesh, field.dashpots, *water);
   Vector<D> one{};
   one[0] = 1;
-  std::vector<Vector<D>> change(model.mesh.points.size(), one), sum(change.size());
-  add_gained_momentum<G>(model, field, water, change, sum);
-  std::ranges::fill(change, Vector<D>{});
+  const std::size_t nodes = model.mesh.points.size();
+  std::vector<Vector<D>> mass(nodes), acceleration(nodes), gained(nodes);
+  add_gained_momentum<G>(model, field, water, std::vector<Vector<D>>(nodes, one), mass);
+  for (const DashpotNode<D>& entry : field.dashpots)
+    if (mass[entry.node][0] > 0) // some soil is there
+      acceleration[entry.node][0] += entry.area / mass[entry.node][0];
+  add_gained_momentum<G>(model, field, water, acceleration, gained);
   for (DashpotNode<D>& entry : field.dashpots)
   {
-    entry.response = sum[entry.node][0]; // the mass until it is found
-    if (entry.response > 0)              // some soil is there
-      change[entry.node][0] += entry.area / entry.response;
+    const double alone = mass[entry.node][0] * acceleration[entry.node][0];
+    entry.response = alone > 0 ? gained[entry.node][0] / alone : 1;
   }
-  std::ranges::fill(sum, Vector<D>{});
-  add_gained_momentum<G>(model, field, water, change, sum);
-  for (DashpotNode<D>& entry : field.dashpots)
-    entry.response = entry.response > 0 ? sum[entry.node][0] / (entry.response * change[entry.node][0]) : 1;
 }
 
 template <class G>

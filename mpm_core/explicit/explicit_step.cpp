@@ -126,8 +126,11 @@ void update_stress_last(Model<G>& model, const ExplicitOptions& options, double 
   {
     clock.begin(Phase::momentum);
     find_acceleration(gravity, options.damping, dt, field);
-    find_advanced_velocity(dt, field);
-    add_dashpot_forces(model.mesh, model.time, dt, false, field);
+    if (options.has_dashpots)
+    {
+      find_advanced_velocity(dt, field);
+      add_dashpot_forces(model.mesh, model.time, dt, false, field);
+    }
     find_velocity_change(field, options.pic_fraction, dt);
     find_advanced_velocity(dt, field);
     add_work(field, model.exchange.owned, gravity, options.damping, dt, model.totals);

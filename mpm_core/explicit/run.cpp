@@ -172,6 +172,8 @@ template <class G>
 std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const RunOptions& run)
 {
   require_integration(model, options);
+  ExplicitOptions of_step = options;
+  of_step.has_dashpots = has_dashpots(model, options.stress_update);
   if (options.reproducible)
     require_plain(model, options, "reproducible is True");
   if (options.transfer == Transfer::affine)
@@ -184,8 +186,6 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
   prepare(model);
   if (options.moving_cells)
     begin_moving_cells(model);
-  ExplicitOptions of_step = options;
-  of_step.has_dashpots = has_dashpots(model, options.stress_update);
   std::int64_t done = 0;
   double dt = 0;
   const double closeness = 1e-9 * std::abs(run.until);
