@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from partitions import all_by_id, assert_same, bands, scattered, sliding_slope
+from sanisand_cases import sand
 from test_laws_external import VonMises
 from test_laws_failure import Fragile
 
@@ -22,16 +23,12 @@ CLAY = mpm.CamClay(compression=0.2, swelling=0.05, critical_slope=1.0, poisson=0
                    preconsolidation=4e3, attraction=3e3)  # fmt: skip
 SAND = mpm.NorSand(critical_void_ratio=0.9, critical_compression=0.03, critical_slope=1.25, dilatancy=4.0, hardening=100.0,
                    rigidity=200.0, poisson=0.2, void_ratio=0.9, image_pressure=3e3, attraction=3e3)  # fmt: skip
-CYCLIC = mpm.Sanisand(rigidity=125.0, poisson=0.05, critical_slope=1.25, extension_ratio=0.712, critical_void_ratio=0.934,
-                      critical_compression=0.019, critical_exponent=0.7, hardening=7.05, hardening_void_ratio=0.968,
-                      bounding_exponent=1.1, dilatancy=0.704, dilatancy_exponent=3.5, fabric_limit=4.0, fabric_rate=600.0,
-                      void_ratio=0.8, largest_pressure=5e3, attraction=3e3)  # fmt: skip
 WATER = {"water_modulus": 4e6, "porosity": 0.4}
 LAWS = {
     "softening": SOFTENING,
     "Cam-Clay": CLAY,
     "NorSand": SAND,
-    "SANISAND": CYCLIC,
+    "SANISAND": sand(largest_pressure=5e3, attraction=3e3),
     "Python": mpm.PythonLaw(VonMises(strength=3e3)),
     "undrained Hencky": mpm.Undrained(mpm.Hencky(SOFTENING), **WATER),
     "viscoplastic": mpm.ViscoplasticMohrCoulomb(**ELASTIC, cohesion=1e3, friction_angle=25.0, viscosity=1e4),

@@ -97,7 +97,7 @@ double elastic_fraction(const Sand& sand, const Increment<D>& increment, const E
   if (first.f > -on_surface)
   {
     const Loading<D> at = loading<D>(sand, path.start, increment.void_ratio(0));
-    if (loads(sand, at, increment.strain) > 0)
+    if (load(at, increment.strain, sand.bulk) > 0)
       return 0;
   }
   const Sample last{1, beyond(1)};

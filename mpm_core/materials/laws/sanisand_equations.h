@@ -164,11 +164,12 @@ Loading<D> loading(const Sand& sand, const Point<D>& point, double void_ratio)
   return at;
 }
 
-/// Whether an increment loads a point on its yield surface: n : ds - n : r dp of an elastic increment, over 2 G
+/// How far an increment loads a point on its yield surface: n : ds - n : r dp of an elastic increment, over 2 G
+/// @param bulk  K / G
 template <int D>
-double loads(const Sand& sand, const Loading<D>& at, const Strain<D>& strain)
+double load(const Loading<D>& at, const Strain<D>& strain, double bulk)
 {
-  return product<D>(at.n, strain.deviator) - 0.5 * at.ratio * sand.bulk * strain.volumetric;
+  return product<D>(at.n, strain.deviator) - 0.5 * at.ratio * bulk * strain.volumetric;
 }
 
 /// b_0 of the hardening; soil looser than 1 / c_h keeps some
@@ -210,12 +211,11 @@ Point<D> rates(const Sand& sand, const Increment<D>& increment, const Point<D>& 
   const double twice = 2 * at.shear;
   const double modulus = 2.0 / 3 * point.pressure * h * at.to_bounding; // K_p
   const double of_flow = twice * product<D>(at.n, flow);
-  double bulk = sand.bulk * at.shear;
+  double bulk = sand.bulk; // over G
   const auto multiplier_of = [&]
   {
-    const double load = twice * product<D>(at.n, strain.deviator) - at.ratio * bulk * strain.volumetric;
-    const double resistance = modulus + of_flow - bulk * dilatancy * at.ratio;
-    return std::max(load, 0.0) / std::max(resistance, 0.01 * twice);
+    const double resistance = modulus + of_flow - bulk * at.shear * dilatancy * at.ratio;
+    return twice * std::max(load(at, strain, bulk), 0.0) / std::max(resistance, 0.01 * twice);
   };
   double multiplier = multiplier_of();
   if (!(point.pressure > sand.least) && strain.volumetric < multiplier * dilatancy)
@@ -225,7 +225,7 @@ Point<D> rates(const Sand& sand, const Increment<D>& increment, const Point<D>& 
   }
 
   Point<D> rate;
-  rate.pressure = bulk * (strain.volumetric - multiplier * dilatancy);
+  rate.pressure = bulk * at.shear * (strain.volumetric - multiplier * dilatancy);
   rate.deviator = scaled<D>(twice, sum<D>(strain.deviator, -multiplier, flow));
   const double hardened = 2.0 / 3 * multiplier * h;
   rate.back = scaled<D>(hardened, sum<D>(scaled<D>(at.bounding, at.n), -1, point.back));
