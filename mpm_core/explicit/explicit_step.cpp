@@ -235,8 +235,9 @@ void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
   if (model.failure)
     return;
   end_contacts(model, {model.time, dt});
+  const VelocityField<G>* water = has_two_phases(model) ? &model.water_field.motion : nullptr;
   for (VelocityField<G>& field : model.fields)
-    move_springs(model.mesh, model.time + 0.5 * dt, dt, field);
+    move_springs(model.mesh, model.time + 0.5 * dt, dt, field, water);
   model.time += dt;
   ++model.totals.steps;
   model.totals.particle_steps += model.particles.size();

@@ -187,6 +187,21 @@ private:
   std::vector<std::vector<typename FreeField<D>::State>> _states; ///< at the heights of each free field
 };
 
+/// Mean of velocities of soil and water at a node, by their masses.
+/// @param velocity  the member of both fields that is meant
+template <class G, int D = G::dim>
+Vector<D> velocity_of_both(const VelocityField<G>& soil, const VelocityField<G>* water, Index i,
+                           std::vector<Vector<G::dim>> VelocityField<G>::*velocity)
+{
+  Vector<D> mean = (soil.*velocity)[i];
+  if (!water || is_light(*water, i))
+    return mean;
+  const double part = water->nodes[i].mass / (soil.nodes[i].mass + water->nodes[i].mass);
+  for (int a = 0; a < D; ++a)
+    mean[a] += part * ((water->*velocity)[i][a] - mean[a]);
+  return mean;
+}
+
 /// What moves at a node, and the force on it but for dashpots: the soil, and its water where that moves by itself.
 template <int D>
 struct MovingNode
@@ -200,16 +215,14 @@ template <class G, int D = G::dim>
 MovingNode<D> moving_node(const VelocityField<G>& field, const VelocityField<G>* water, Index i,
                           const Vector<G::dim>& gravity)
 {
-  MovingNode<D> node{field.nodes[i].mass, field.start_velocity[i], unbalanced_force<D>(field.nodes[i], gravity)};
+  MovingNode<D> node{field.nodes[i].mass, velocity_of_both(field, water, i, &VelocityField<G>::start_velocity),
+                     unbalanced_force<D>(field.nodes[i], gravity)};
   if (!water)
     return node;
-  const double of_water = is_light(*water, i) ? 0 : water->nodes[i].mass, mass = node.mass + of_water;
+  const double of_water = is_light(*water, i) ? 0 : water->nodes[i].mass;
   for (int a = 0; a < D; ++a)
-  {
     node.residual[a] += of_water * gravity[a] - water->nodes[i].internal[a];
-    node.velocity[a] = (node.mass * node.velocity[a] + of_water * water->start_velocity[i][a]) / mass;
-  }
-  node.mass = mass;
+  node.mass += of_water;
   return node;
 }
 
@@ -331,13 +344,11 @@ void add_dashpot_forces(const Mesh<G::dim>& mesh, double time, double dt, bool s
       return;
     const double of_soil = field.nodes[i].mass, of_water = water && !is_light(*water, i) ? water->nodes[i].mass : 0;
     const double mass = of_soil + of_water;
+    const Vector<D> start = velocity_of_both(field, water, i, &VelocityField<G>::start_velocity);
+    const Vector<D> end = velocity_of_both(field, water, i, &VelocityField<G>::velocity);
     Vector<D> mean;
     for (int a = 0; a < D; ++a)
-    {
-      mean[a] = 0.5 * of_soil / mass * (field.start_velocity[i][a] + field.velocity[i][a]);
-      if (of_water > 0)
-        mean[a] += 0.5 * of_water / mass * (water->start_velocity[i][a] + water->velocity[i][a]);
-    }
+      mean[a] = 0.5 * (start[a] + end[a]);
     const double k = shared ? entries[0].response : 1;
     Vector<D> gained = acceleration_by_dashpots<G, D>(entries, beside, dt, mass, k, mean);
     if (const Support<D>* support = support_of(field, i))
@@ -354,7 +365,8 @@ void add_dashpot_forces(const Mesh<G::dim>& mesh, double time, double dt, bool s
 }
 
 template <class G>
-void move_springs(const Mesh<G::dim>& mesh, double time, double dt, VelocityField<G>& field)
+void move_springs(const Mesh<G::dim>& mesh, double time, double dt, VelocityField<G>& field,
+                  const VelocityField<G>* water)
 {
   constexpr int D = G::dim;
   const Beside<G> beside(mesh, field, time);
@@ -362,8 +374,10 @@ void move_springs(const Mesh<G::dim>& mesh, double time, double dt, VelocityFiel
   {
     // a wave that goes by moves the springs; a free field takes them along
     const auto ground = entry.free_field == none ? typename FreeField<D>::State{} : beside.at(entry);
+    const Index i = entry.node;
+    const Vector<D> velocity = velocity_of_both(field, water, i, &VelocityField<G>::velocity);
     for (int a = 0; a < D; ++a)
-      entry.displacement[a] += dt * (field.velocity[entry.node][a] - ground.velocity[a]);
+      entry.displacement[a] += dt * (velocity[a] - ground.velocity[a]);
   }
 }
 
@@ -372,7 +386,7 @@ void move_springs(const Mesh<G::dim>& mesh, double time, double dt, VelocityFiel
   template void add_forces_of_ground(const Mesh<G::dim>&, const Vector<G::dim>&, double, double, VelocityField<G>&,    \
                                      VelocityField<G>*);                                                               \
   template void add_dashpot_forces(const Mesh<G::dim>&, double, double, bool, VelocityField<G>&, VelocityField<G>*);   \
-  template void move_springs(const Mesh<G::dim>&, double, double, VelocityField<G>&);
+  template void move_springs(const Mesh<G::dim>&, double, double, VelocityField<G>&, const VelocityField<G>*);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

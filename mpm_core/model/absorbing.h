@@ -47,7 +47,8 @@ template <class G>
 void add_dashpot_forces(const Mesh<G::dim>& mesh, double time, double dt, bool shared, VelocityField<G>& field,
                         VelocityField<G>* water = nullptr);
 
-/// Moves the springs with their nodes, relative to the free fields at a time.
+/// Moves the springs with the mean velocity of soil and water at their nodes, relative to the free fields at a time.
 template <class G>
-void move_springs(const Mesh<G::dim>& mesh, double time, double dt, VelocityField<G>& field);
+void move_springs(const Mesh<G::dim>& mesh, double time, double dt, VelocityField<G>& field,
+                  const VelocityField<G>* water = nullptr);
 } // namespace mpm::model

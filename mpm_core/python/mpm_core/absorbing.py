@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ._core import InputError
 from .checks import flag, positive
 from .collective import collectively
-from .free_field import layers_at
+from .free_field import layers_at, layers_of
 from .ground_column import Base, GroundColumn, Layers
 from .mesh import Mesh, Tag, floats
 from .motion import Motion
@@ -58,7 +58,8 @@ class AbsorbingSides:
         motion, and the stresses that it makes act on the side. So a level site moves as if it had no sides.
 
         Soil with pore water has the wave speeds and stiffnesses of undrained soil, and no water passes the side unless
-        `hold_pore_pressure` prescribes its pressure there. In a free field water does not flow through the soil.
+        `hold_pore_pressure` prescribes its pressure there. In a free field water flows up and down through the soil, and leaves it
+        at the surface.
 
         Args:
             facet_tag: facets with this tag, or these tags, by number or name, at cells with soil.
@@ -195,7 +196,10 @@ class AbsorbingSides:
         if self._free_fields:
             self._free_damping = rayleigh
         if not self._columns:
-            self._columns = [GroundColumn(layers, self.laws, self._base(), rayleigh) for layers in self._free_fields]
+            water = self._core.water
+            self._columns = [
+                GroundColumn(layers, self.laws, self._base(), rayleigh, water) for layers in self._free_fields
+            ]
         self._set_tables([(column.heights, *column.advance(self._core.time, until)) for column in self._columns])
 
     def _set_tables(self, tables: list[Any]) -> None:
@@ -243,7 +247,7 @@ class AbsorbingSides:
         ]
         self._core.set_dashpots([(place, [tuple(entry) for entry in entries]) for place, entries in state["nodes"]])
         self._take_incoming(state["incoming"])
-        self._free_fields = [Layers(**entry) for entry in state["free_fields"]]
+        self._free_fields = [layers_of(entry, self._core.water) for entry in state["free_fields"]]
         damping = state.get("free_damping")  # not in older files
         self._free_damping = None if damping is None else Rayleigh(*map(_given, damping))
         self._columns, self._tables = [], []  # a run begins them anew, and brings them to the present

@@ -15,6 +15,8 @@ from .resting import represented
 
 SAME_LEVEL = 1e-6
 """Difference in height, over that of the side, of nodes on one level"""
+CLOSED = 1e-30
+"""Conductivity through which no water flows [m/s]"""
 LEAST_LAYER = 0.3
 """Least thickness of a layer, over the height of the facets of a side in three dimensions"""
 
@@ -67,18 +69,50 @@ def layers_at(model: Any, tag: int) -> Layers:
         first = columns[chosen][0]  # of several laws beside each other
         rows.append([*first[:2], *mean[2:]])
     values = np.array(rows)
+    water, wet, pores = model._core.water, 4, []
+    if water is not None:
+        wet += dim + 4
+        pores = _pores_at(0.5 * (heights[:-1] + heights[1:]), values[:, 4:wet], water, max(0.0, -model.gravity[-1]))
     return Layers(
         heights=heights.tolist(),
         law=values[:, 0].astype(int).tolist(),
         coupled_mass=[coupled_mass(count, dim) for count in values[:, 1].round().astype(int)],
         density=values[:, 2].tolist(),
         cell_size=values[:, 3].tolist(),
-        water=values[:, 4].tolist(),
-        stress=values[:, 5 : 5 + width].tolist(),
-        state=values[:, 5 + width :].tolist(),
+        pores=pores,
+        stress=values[:, wet : wet + width].tolist(),
+        state=values[:, wet + width :].tolist(),
         normal=(normal / np.linalg.norm(normal)).tolist(),
         time=model.time,
+        gravity=max(0.0, -model.gravity[-1]),
     )
+
+
+def _pores_at(middle: NDArray[np.float64], means: NDArray[np.float64], water: Any, gravity: float) -> list[list[float]]:
+    """Pores and water of layers, see `Layers`.
+
+    Args:
+        middle: heights of the middle of the layers [m], (n).
+        means: of `_pores` over their cells, (n, D + 4), whose particles may lie at other heights.
+        water: properties of the water.
+        gravity: downwards [m/s2].
+    """
+    porosity, content, pressure, height = means[:, 0], *means[:, -3:].T
+    full = pressure > -water.suction_limit
+    pressure = np.where(full, pressure + water.density * gravity * (height - middle), pressure)
+    content = np.where(full, water.density * porosity * (1 + pressure / water.modulus), content)
+    return np.column_stack([means[:, :-3], content, pressure]).tolist()
+
+
+def layers_of(entry: dict[str, Any], water: Any) -> Layers:
+    """Layers from a checkpoint; an older one has the stiffness K_w / n of water that moves with the soil."""
+    fields = dict(entry)
+    stiffness = np.array(fields.pop("water", []))
+    if stiffness.any():
+        porosity = water.modulus / stiffness
+        still = np.full((len(porosity), len(fields["normal"])), CLOSED)
+        fields["pores"] = np.column_stack([porosity, still, water.density * porosity, 0 * porosity]).tolist()
+    return Layers(**fields)
 
 
 def _levels(heights: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -107,22 +141,33 @@ def _mass(model: Any) -> NDArray[np.float64]:
     return p.mass + p.water_mass if model._core.has_two_phases else p.mass
 
 
-def _water_stiffness(model: Any) -> NDArray[np.float64]:
-    """K_w / n of the particles [Pa], (n); 0 without pore water."""
-    p = model.particles
-    return np.zeros(len(p)) if model._core.water is None else model._core.water.modulus / p.porosity
+def _pores(model: Any) -> NDArray[np.float64]:
+    """Porosity, conductivity along each axis [m/s], mass of the water in a volume of soil [kg/m3], pore pressure [Pa] and height [m]
+    of the particles, (n, D + 4); (n, 0) without pore water."""
+    p, water, dim = model.particles, model._core.water, model.mesh.dim
+    if water is None:
+        return np.empty((len(p), 0))
+    if model._core.has_two_phases:
+        content = p.water_mass / p.volume
+    else:
+        content = water.density * p.porosity * (1 + p.pore_pressure / water.modulus)
+    ratios = np.ones((len(p), dim))
+    if water.anisotropy:
+        ratios = np.diagonal(np.array(water.anisotropy), axis1=1, axis2=2)[p.material, :dim]
+    conductivity = p.conductivity[:, None] * ratios
+    return np.column_stack([p.porosity, conductivity, content, p.pore_pressure, p.position[:, -1]])
 
 
 def _facets_of(model: Any, tag: int) -> tuple[NDArray, NDArray, NDArray]:
     """Of this rank's facets with soil: corners (m, D, D), outer normals (m, D), and sums over their cells (m, ...).
 
-    The sums are those of volume times 1, law, number of particles, density, cell size, stiffness of the water, stress and state.
+    The sums are those of volume times 1, law, number of particles, density, cell size, pores, stress and state.
     """
     mesh, n, p = model.mesh, model.mesh.owned_cells, model.particles
     dim = mesh.dim
     values = np.column_stack(
         [np.ones(len(p)), p.material, _counts(model), _mass(model) / p.volume, cell_sizes(mesh.cell_volumes, dim)[p.cell],
-         _water_stiffness(model), p.stress, p.state]
+         _pores(model), p.stress, p.state]
     )  # fmt: skip
     sums = np.zeros((n, values.shape[1]))
     np.add.at(sums, p.cell, p.volume[:, None] * values)

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._core import RunError
+from ._core import RunError, fast_wave_squared
+from .ground_water import GroundWater, to_levels
 from .rayleigh import Rayleigh
 
 Floats = NDArray[np.float64]
@@ -31,9 +32,11 @@ class Layers:
         state: state variables, (n, n_state) of the law with the most.
         cell_size: [m], (n).
         coupled_mass: fraction of a layer's mass by which one of its levels takes the velocity of the other, (n).
-        water: stiffness K_w / n of the pore water [Pa], (n), which does not drain; 0 or an empty list where there is none.
         normal: outer one of the side beside the column, (D).
         time: when it begins to move [s].
+        pores: porosity [-], conductivity along each axis [m/s], mass of the water in a volume of soil [kg/m3], and pore pressure
+            [Pa], (n, D + 3); an empty list without pore water.
+        gravity: downwards [m/s2].
     """
 
     heights: list[float]
@@ -45,7 +48,8 @@ class Layers:
     coupled_mass: list[float]
     normal: list[float]
     time: float
-    water: list[float] = field(default_factory=list)  # not in older checkpoints
+    pores: list[list[float]] = field(default_factory=list)
+    gravity: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -78,17 +82,20 @@ class GroundColumn:
     """Level ground by linear finite elements over its height, in explicit steps of one length like those of a model.
 
     All points of a level move alike. The mass matrix of velocities is that of the particles, so that waves are as fast as in
-    the model. Pore water moves with the soil. Strains are small: the column keeps its geometry, and stresses are not
-    rotated. Only what changes from the start counts, so that it begins in equilibrium.
+    the model. Pore water flows through the soil (`GroundWater`). Strains are small: the column keeps its geometry, and stresses
+    are not rotated. Of total stresses only what changes from the start counts, so that it begins in equilibrium.
 
     Args:
         layers: the soil.
         laws: those of the model.
         base: what it stands on; None for a base at rest.
         rayleigh: damping at small strains.
+        water: properties of the pore water of the model; None without.
     """
 
-    def __init__(self, layers: Layers, laws: list[Any], base: Base | None, rayleigh: Rayleigh) -> None:
+    def __init__(
+        self, layers: Layers, laws: list[Any], base: Base | None, rayleigh: Rayleigh, water: Any = None
+    ) -> None:
         self.heights = np.array(layers.heights)
         self._laws, self._base, self._rayleigh = laws, base, rayleigh
         self._law, self._cell_size = np.array(layers.law), np.array(layers.cell_size)
@@ -103,17 +110,32 @@ class GroundColumn:
         p_wave, shear = np.empty((2, n))
         for law, rows in self._pieces:
             p_wave[rows], shear[rows] = law.wave_moduli(self.stress[rows], self._state_of(law, rows)).T
-        self._water = np.array(layers.water) if layers.water else np.zeros(n)
-        self._pressure = np.zeros(n)  # of the water, since the start
-        p_wave += self._water
-        self._moduli = np.column_stack([shear] * (dim - 1) + [p_wave])  # (n, D), across and along the column
+        self._moduli = np.column_stack(
+            [shear] * (dim - 1) + [p_wave]
+        )  # (n, D), of the soil across and along the column
         self._lame = p_wave - 2 * shear
         self._mass = self._density * self._thickness
         self._coupled = (self._mass * layers.coupled_mass)[:, None]
         self._own = 0.5 * self._mass[:, None] - self._coupled
-        self._nodal_mass = self._to_levels(0.5 * self._mass, 0.5 * self._mass)
-        highest = np.maximum(p_wave, self._water + [laws[k].p_wave_modulus for k in self._law])  # as it may become
-        critical = float((self._thickness * np.sqrt(self._density / highest)).min())
+        self._nodal_mass = to_levels(0.5 * self._mass, 0.5 * self._mass)
+        highest = np.maximum(p_wave, [laws[k].p_wave_modulus for k in self._law])  # as it may become
+        speeds = np.sqrt(highest / self._density)
+        self._base_moduli = self._moduli[0].copy()  # of the ground below, undrained where it has water
+        self._water = None
+        if layers.pores:
+            pores = np.array(layers.pores)
+            self._water = GroundWater(
+                self._thickness, self._mass, pores, water, layers.gravity, self.heights[-1], layers.time
+            )
+            of_water = pores[:, -2]
+            speeds = np.sqrt([
+                fast_wave_squared(*row)
+                for row in np.column_stack(
+                    [highest, np.full(n, water.modulus), pores[:, 0], self._density - of_water, of_water]
+                )
+            ])  # fmt: skip
+            self._base_moduli[-1] += self._water.stiffness[0]
+        critical = float((self._thickness / speeds).min())
         self.dt = COURANT * rayleigh.time_step(critical)
         """Length of a step [s]"""
         self.velocity, self._displacement = np.zeros((n + 1, dim)), np.zeros(dim)
@@ -151,22 +173,17 @@ class GroundColumn:
         """State variables of layers of a law, (m, n_state)."""
         return np.ascontiguousarray(self._state[rows, : law.n_state])
 
-    def _to_levels(self, lower: Floats, upper: Floats) -> Floats:
-        """Contributions of the layers to the levels below and above them."""
-        total = np.zeros((len(lower) + 1, *lower.shape[1:]))
-        total[:-1] += lower
-        total[1:] += upper
-        return total
-
     def _change(self) -> Floats:
         """Total stress since the start, (n, S)."""
         change = self.stress - self._stress_start
-        change[:, :3] -= self._pressure[:, None]
+        if self._water:
+            change[:, :3] -= self._water.pressure_change[:, None]
         return change
 
     def _rates(self) -> Floats:
-        """Derivative of the velocity by height, (n, D)."""
-        return np.diff(self.velocity, axis=0) / self._thickness[:, None]
+        """Derivative of the velocity of the soil by height, (n, D)."""
+        velocity = self._water.velocity_of_soil(self.velocity) if self._water else self.velocity
+        return np.diff(velocity, axis=0) / self._thickness[:, None]
 
     def _is_damped(self) -> NDArray[np.bool_]:
         if self._state.shape[1] == 0:
@@ -188,10 +205,13 @@ class GroundColumn:
         damped = self._is_damped()
         viscous = self._viscous_stress(damped)
         on_plane = (self._change() + viscous)[:, self._on_plane]
-        force = self._to_levels(on_plane, -on_plane)
+        force = to_levels(on_plane, -on_plane)
+        if self._water:
+            force[:, -1] += self._water.loads_of(self.time)
+            self._water.accelerate(self.dt, force, self._is_held(), self.time)
         if self._rayleigh.mass > 0:
             half = 0.5 * self._rayleigh.mass * self._mass * damped
-            force -= self._to_levels(half, half)[:, None] * self.velocity
+            force -= to_levels(half, half)[:, None] * self.velocity
         change = self.dt * force / self._nodal_mass[:, None]
         self._take(change)
         self._displacement += self.dt * self.velocity[0]
@@ -199,19 +219,23 @@ class GroundColumn:
         self._steps += 1
         return viscous
 
+    def _is_held(self) -> bool:
+        """Whether the motion of the base is prescribed."""
+        return self._base is None or bool(np.isinf(self._base.impedances[0]))
+
     def _take(self, change: Floats) -> None:
         """Change the velocities, with the dashpots of the base, which act as those of a model."""
         base = self._base
-        if base is None or np.isinf(base.impedances[0]):
+        if base is None or self._is_held():
             end = 0.0 * change[0] if base is None else 2 * base.wave(self.time + 0.5 * self.dt)
             change[0] = end - self.velocity[0]
             self.velocity += self._gained(change)
             self.velocity[0] = end
             return
-        change[0] -= self.dt / self._nodal_mass[0] * self._moduli[0] / base.thickness * self._displacement
+        change[0] -= self.dt / self._nodal_mass[0] * self._base_moduli / base.thickness * self._displacement
         normal, shear = base.impedances
         damping = np.array([shear] * (change.shape[1] - 1) + [normal])
-        damping = np.where(damping > 0, damping, np.sqrt(self._density[0] * self._moduli[0]))
+        damping = np.where(damping > 0, damping, np.sqrt(self._density[0] * self._base_moduli))
         mean = self.velocity[0] + 0.5 * self._gained(change)[0]
         against = 2 * base.wave(self.time + 0.5 * self.dt) - mean
         shared = self._own[0] / self._nodal_mass[0]  # part of an acceleration at the base that its particles take
@@ -221,13 +245,14 @@ class GroundColumn:
     def _gained(self, change: Floats) -> Floats:
         """What the particles gain at the levels by changes of the velocities there."""
         lower, upper = change[:-1], change[1:]
-        gained = self._to_levels(self._own * lower + self._coupled * upper, self._coupled * lower + self._own * upper)
+        gained = to_levels(self._own * lower + self._coupled * upper, self._coupled * lower + self._own * upper)
         return gained / self._nodal_mass[:, None]
 
     def _strain(self) -> None:
         increment = np.zeros_like(self.stress)
         increment[:, self._on_plane] = self.dt * self._rates()
-        self._pressure -= self._water * increment[:, self._on_plane[-1]]
+        if self._water:
+            self._water.follow(self.dt, increment[:, self._on_plane[-1]], self.time)
         for law, rows in self._pieces:
             if len(rows) == 0:
                 continue
@@ -244,5 +269,5 @@ class GroundColumn:
         """On the side, means of the layers around each level, (n + 1, D) [Pa]."""
         change = self._change() + viscous
         traction = np.einsum("nij,j->ni", change[:, self._on_side], self._normal) * self._thickness[:, None]
-        length = self._to_levels(self._thickness, self._thickness)
-        return self._to_levels(traction, traction) / length[:, None]
+        length = to_levels(self._thickness, self._thickness)
+        return to_levels(traction, traction) / length[:, None]

@@ -72,13 +72,15 @@ def test_free_fields_on_a_stiff_base_keep_the_amplitude_of_a_steady_motion(imped
     levels = np.linspace(0, HEIGHT, CELLS + 1)
     layers = Layers(
         heights=list(levels), law=[0] * CELLS, density=[DENSITY] * CELLS, stress=np.zeros((CELLS, 4)).tolist(), state=[[0.0]] * CELLS,
-        cell_size=[1.0] * CELLS, coupled_mass=[1 / 6] * CELLS, normal=[1.0, 0.0], time=0.0, water=[4e8] * CELLS,
+        cell_size=[1.0] * CELLS, coupled_mass=[1 / 6] * CELLS, normal=[1.0, 0.0], time=0.0, pores=[[0.5, 1e-9, 1e-9, 500.0, 0.0]] * CELLS,
     )  # fmt: skip
     time = np.linspace(0, 12, 4801)
     base = Base(
         (impedance,) * 2, 200.0, time, 0.1 * np.sin(4 * np.pi * time) * np.minimum(1, time), np.array([0.6, 0.8])
     )
-    column = GroundColumn(layers, [LAW], base, mpm.Rayleigh(0.0, 0.0))
+    water = mpm._core.PoreWater()
+    water.modulus = 2e8
+    column = GroundColumn(layers, [LAW], base, mpm.Rayleigh(0.0, 0.0), water)
     largest = np.zeros(12)
     while column.time < 12:
         column._step()
