@@ -13,12 +13,13 @@ namespace mpm::model
 {
 namespace
 {
-/// Water of full pores in a particle.
+/// Water in the pores of a particle, which are full unless it has a saturation.
 template <int D>
 double water_mass(const Particles<D>& particles, const PoreWater& water, Index p)
 {
   const double density = water.density * (1 + particles.pore_pressure[0][p] / water.modulus);
-  return density * particles.porosity[0][p] * particles.volume[p];
+  const double filled = particles.saturation.present ? particles.saturation[0][p] : 1;
+  return filled * density * particles.porosity[0][p] * particles.volume[p];
 }
 
 template <int D>
@@ -60,6 +61,7 @@ void split_phases(Model<G>& model)
   fill_pores(model);
   for (Index p = 0; p < particles.size(); ++p)
     particles.mass[p] -= particles.water_mass[0][p];
+  particles.saturation = {}; // from now on the masses tell it
   model.ready = false;
   model.energy.stale = true;
 }

@@ -150,7 +150,8 @@ def _pores(model: Any) -> NDArray[np.float64]:
     if model._core.has_two_phases:
         content = p.water_mass / p.volume
     else:
-        content = water.density * p.porosity * (1 + p.pore_pressure / water.modulus)
+        filled = p.saturation if len(p.saturation) else 1.0
+        content = filled * water.density * p.porosity * (1 + p.pore_pressure / water.modulus)
     ratios = np.ones((len(p), dim))
     if water.anisotropy:
         ratios = np.diagonal(np.array(water.anisotropy), axis1=1, axis2=2)[p.material, :dim]

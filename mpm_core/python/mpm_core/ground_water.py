@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .water_checks import LABORATORY_GRAVITY
+
 Floats = NDArray[np.float64]
-LABORATORY_GRAVITY = 9.81
-"""Gravity under which conductivities are measured [m/s2]"""
 
 
 def to_levels(lower: Floats, upper: Floats) -> Floats:

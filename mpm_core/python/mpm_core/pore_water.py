@@ -20,7 +20,7 @@ from .mesh import Tag, floats
 from .parameter_fields import Field
 from .particles import Particles
 from .retention import curves_of_laws, joined
-from .water_checks import density_of_water, require_pores, require_soil
+from .water_checks import density_of_water, require_pores, require_saturation, require_soil
 
 History: TypeAlias = list[tuple[float, float]]
 """Pairs of time [s] and value, of rising times, joined by straight lines; one pair for a value that stays"""
@@ -63,6 +63,7 @@ class PoreWater(Conditions):
         drained_surface: bool = False,
         retention: Any = None,
         anisotropy: Any = None,
+        saturation: Field = 1.0,
         unit_weight: float | None = None,
     ) -> None:
         """Fill the pores of all particles with water, which from then on flows in implicit and explicit steps.
@@ -91,13 +92,16 @@ class PoreWater(Conditions):
             anisotropy: conductivities along the axes over ``conductivity``, (D,), positive, or their tensor, (D, D), symmetric
                 with positive principal values, of strata that dip for instance (`fenics_bridge.water.dipping`); or a list with
                 one for each law (None for 1 in all directions). Axes are fixed in space.
+            saturation: fraction of the pores that water fills as explicit runs begin [-], more than 0 and at most 1: less than 1
+                in moist soil above the water table, which has the pressure of the ``suction_limit`` until its pores are full. As
+                ``porosity``. The density of moist soil is that with its water. Where soil has a retention curve, this gives it.
             unit_weight: old way to give the density, which is ``unit_weight`` / 9.81 m/s2; for one version more.
 
         Raises:
             InputError: on all ranks, for values out of these ranges, or a model without particles.
         """
 
-        def checked() -> tuple[Any, NDArray, NDArray]:
+        def checked() -> tuple[Any, NDArray, NDArray, NDArray]:
             water = _core.PoreWater()
             water.density = density_of_water(density, unit_weight)
             if not modulus > 0:
@@ -109,25 +113,28 @@ class PoreWater(Conditions):
             water.drained_surface = bool(drained_surface)
             n, k = self._values("porosity", porosity), self._values("conductivity", conductivity)
             require_pores(n, k)
+            filled = self._values("saturation", saturation)
+            require_saturation(filled, water.suction_limit, retention)
             self._set_retention(water, curves_of_laws(retention, self.laws))
             water.anisotropy = tensors_of_laws(anisotropy, len(self.laws), self.mesh.dim)
             if any(isinstance(law, _core.Undrained) for law in self.laws):
                 raise InputError(
                     "laws has an Undrained law, which contains pore water already; expected laws of effective stress"
                 )
-            return water, n, k
+            return water, n, k, filled
 
         if self.comm.allreduce(len(self.particles)) == 0:
             raise InputError("the model has no particles, expected them before add_water()")
-        water, n, k = collectively(self.comm, checked)
+        water, n, k, filled = collectively(self.comm, checked)
+        is_moist = self.comm.allreduce(bool((filled < 1).any()), MPI.LOR)
         warn_of_water_density(self.comm, water.density)
         self._core.water = water
         self.particles.set("porosity", n)
         self.particles.set("conductivity", k)
-        self.particles.set("pore_pressure", np.zeros(len(n)))
+        self.particles.set("pore_pressure", np.where(filled < 1, -water.suction_limit, 0.0))
         self.particles.set("pressure_gradient", np.zeros((len(n), self.mesh.dim)))
-        if water.may_dry:
-            self.particles.set("saturation", np.ones(len(n)))
+        if water.may_dry or is_moist:
+            self.particles.set("saturation", filled)
         self._set_water_conditions([])
 
     @property

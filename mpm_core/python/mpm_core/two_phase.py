@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from mpi4py import MPI
 
 from ._core import InputError, Integration, StressUpdate
 from .rayleigh import Rayleigh
@@ -58,6 +59,12 @@ def of_suction(model: Model) -> str:
 
 
 def refuse_two_phases(model: Model, scheme: str) -> None:
-    """Raises InputError after an explicit run, in which the water has a velocity of its own."""
+    """Raises InputError for moist soil, or after an explicit run, in which the water has a velocity of its own. Collective."""
+    water = model._core.water
+    moist = water is not None and not water.may_dry and len(model.particles.saturation) > 0
+    if model.comm.allreduce(moist, MPI.LOR):
+        raise InputError(
+            f"saturation is less than 1 in parts of the soil, which {scheme} does not support; expected a retention curve in its place"
+        )
     if model._core.has_two_phases:
         raise InputError(f"the pore water has a velocity of its own since explicit(), which {scheme} does not support")

@@ -48,6 +48,22 @@ def require_pores(porosity: NDArray, conductivity: NDArray) -> None:
         raise InputError(f"conductivity is {conductivity[bad][0]} m/s, expected positive numbers in all particles")
 
 
+def require_saturation(saturation: NDArray, suction_limit: float, retention: Any) -> None:
+    """Raises InputError for particles of this rank whose pores cannot have such a saturation."""
+    bad = ~((saturation > 0) & (saturation <= 1))
+    if bad.any():
+        raise InputError(f"saturation is {saturation[bad][0]}, expected more than 0 and at most 1 in all particles")
+    moist = saturation < 1
+    if moist.any() and retention is not None:
+        raise InputError(
+            f"saturation is {saturation[moist][0]} beside a retention curve, which gives it; expected one of the two"
+        )
+    if moist.any() and suction_limit == np.inf:
+        raise InputError(
+            f"saturation is {saturation[moist][0]} without a suction_limit, expected one: the suction of pores that are not full [Pa]"
+        )
+
+
 def require_soil(model: PoreWater) -> None:
     """Raises InputError for particles of this rank without pores, or lighter than the water in them."""
     p, water = model.particles, model._core.water

@@ -144,6 +144,37 @@ def test_a_column_drains_at_its_base_by_its_conductivity():
     assert full[z > 0.9].max() < 0.8 and full[z < 0.2].min() > 0.99
 
 
+def test_moist_soil_has_no_pore_pressure_until_its_pores_have_closed_so_far_that_water_fills_them():
+    """Soil that is compressed by 10 in a second, much faster than waves come in from its surface. The upper half is moist."""
+    rate, stiffness, filled = 10.0, 2e3, 0.97
+    model = mpm.Model(box((2, 16), (0.125, 1.0)), mpm.LinearElastic(young=1e3, poisson=0.3))
+    model.seed(density=DENSITY, per_cell=3)
+    for side in (LEFT, RIGHT):
+        model.roller(side, (1, 0))
+    at_first = model.particles.volume
+    moist = model.particles.position[:, 1] > 0.5
+    model.add_water(
+        porosity=POROSITY,
+        conductivity=1e-9,
+        modulus=stiffness,
+        suction_limit=0.0,
+        saturation=np.where(moist, filled, 1.0),
+    )
+    model.particles.set("velocity", -rate * model.particles.position * [0, 1])
+    inner = abs(model.particles.position[:, 1] - 0.5) < 0.4
+    for report in model.explicit(2e-3, every=2e-4, damping=0.0):
+        p = model.particles
+        assert p.mass + p.water_mass == pytest.approx(DENSITY * at_first, rel=1e-5)
+        full = WATER * np.where(moist, filled, 1.0) * POROSITY * at_first
+        assert p.water_mass[inner] == pytest.approx(full[inner], rel=1e-4)
+        pores = POROSITY * at_first - (at_first - p.volume)
+        pressure = np.maximum(0.0, stiffness * (np.where(moist, filled, 1.0) * POROSITY * at_first / pores - 1))
+        assert p.pore_pressure[inner] == pytest.approx(pressure[inner], abs=1e-3 * stiffness)
+        closed = 1 - np.exp(-rate * report.time) > POROSITY * (1 - filled)
+        assert (p.pore_pressure[inner & moist] > 0).all() == closed
+    assert closed
+
+
 # --- input ------------------------------------------------------------------------------------------------------------
 
 
@@ -163,6 +194,15 @@ def test_input_that_explicit_water_cannot_work_with():
     column(4).explicit(1e-4, rayleigh=mpm.Rayleigh(plastic_strain=np.inf)).last()  # damping of zero is none
     with pytest.raises(mpm.InputError, match="suction_limit is -1.0 Pa, expected 0 or more"):
         model.add_water(porosity=0.4, conductivity=1e-3, suction_limit=-1.0)
+    for saturation, limit in ((0.0, 0.0), (1.1, 0.0), (np.nan, 0.0), (0.5, np.inf)):
+        with pytest.raises(mpm.InputError, match=f"saturation is {saturation}"):
+            model.add_water(porosity=0.4, conductivity=1e-3, saturation=saturation, suction_limit=limit)
+    with pytest.raises(
+        mpm.InputError, match="saturation is less than 1 in parts of the soil, which implicit\\(\\) does not"
+    ):
+        model.add_water(porosity=0.4, conductivity=1e-3, saturation=0.5, suction_limit=0.0)
+        model.implicit(1.0, dt=0.1)
+    model.add_water(porosity=0.4, conductivity=1e-3)
     with pytest.raises(mpm.InputError, match="above the critical time step"):
         list(model.explicit(1.0, dt=1.1 * model.wave_speeds().fast))
     with pytest.raises(mpm.InputError, match="which implicit\\(\\) does not support"):
