@@ -12,10 +12,11 @@ from fenics_bridge.fem.fem_site import FemSite
 from fenics_bridge.fem.fields import nodal_average
 from fenics_bridge.fem.geometry import Geometry
 from fenics_bridge.fem.k0 import k0_elastic, k0_jaky, k0_layered_stress, k0_stress
-from fenics_bridge.fem.limit_analysis import LogSpiral, log_spiral, log_spiral_safety
+from fenics_bridge.fem.limit_analysis import LogSpiral, log_spiral, log_spiral_safety, log_spiral_seismic
 from fenics_bridge.fem.load_steps import LoadStep, print_step
 from fenics_bridge.fem.loads import Load
 from fenics_bridge.fem.mixed import MixedQuasiStatic
+from fenics_bridge.fem.pseudo_static import pseudo_static
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.fem.solver import PRACTICE, Solver
 from fenics_bridge.fem.stages import Stage, StageError, StageReport, carry_out, hydrostatic
@@ -44,8 +45,8 @@ __all__ = [
     "StageError", "StageReport", "Support", "apply_supports", "background_arrays", "background_mesh", "boundary_forces",
     "box_mesh", "carry_out", "collapse_load", "compare", "davis_reduced_strength", "davis_strength", "evaluate_at",
     "factor_of_safety", "fixed", "flat_normal", "graded_tags", "hydrostatic", "initialise", "k0_elastic", "k0_jaky",
-    "k0_layered_stress", "k0_stress", "log_spiral", "log_spiral_safety", "name_tags", "names_of", "nodal_average",
-    "original_cells", "particle_safety", "prescribed", "print_step", "read_mesh", "reduced_strength", "roller",
+    "k0_layered_stress", "k0_stress", "log_spiral", "log_spiral_safety", "log_spiral_seismic", "name_tags", "names_of", "nodal_average",
+    "original_cells", "particle_safety", "prescribed", "print_step", "pseudo_static", "read_mesh", "reduced_strength", "roller",
     "seepage_forces", "slope_mesh", "soil_mesh", "solve_elastic", "solve_nearly_incompressible",
 ]
 # fmt: on

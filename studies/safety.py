@@ -2,7 +2,8 @@
 
 Cohesion and tan(friction angle) are divided by a rising factor until there is no equilibrium under the unit weight any more
 (strength reduction), on several meshes. Flow is associated unless a dilation angle is given; results without dilation are
-reported as well.
+reported as well. With --seismic-coefficient a part of the weight acts out of the slope besides, as the inertia of an earthquake
+(pseudo-static analysis); --critical-seismic finds the coefficient at which the slope fails, for Newmark's method.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from common.slope_fem import (
     add_fem_slope_options,
     add_ground_option,
     check_fem_slope_options,
+    finite_elements,
     mesh_sizes,
     outside_line,
     slope_fem,
@@ -51,6 +53,14 @@ def parser() -> ArgumentParser:
     add_fem_slope_options(p)
     add_ground_option(p)
     add_number(p, "--unit-weight", 20e3, "N/m3", "unit weight of the soil", above=0)
+    add_number(
+        p,
+        "--seismic-coefficient",
+        0.0,
+        "-",
+        "horizontal inertia force over the weight, out of the slope; of a site along the first axis",
+    )
+    add_flag(p, "--critical-seismic", "also find the seismic coefficient at which soil of full strength fails")
     add_number(p, "--start", 0.5, "-", "first factor of safety to try; the slope must be stable with it", above=0)
     add_flow_options(p)
     add_site_option(p)
@@ -75,7 +85,10 @@ def parse(arguments: list[str] | None = None) -> Namespace:
           lambda: f"--unreduced names {', '.join(options.unreduced)}, expected --site: the slope has one soil")  # fmt: skip
     check(p, options.depth == 0 or not options.particles,
           lambda: f"--depth is {options.depth:g}, expected 0 with --particles, which stand on a rigid base")  # fmt: skip
-    check_site_options(p, options, {"unreduced", "start", "meshes", "elements", "equilibrium", "particles"})
+    check(p, options.site is not None or options.seismic_coefficient >= 0,
+          lambda: f"--seismic-coefficient is {options.seismic_coefficient:g}, expected at least 0: out of the slope")  # fmt: skip
+    check_site_options(p, options, {"unreduced", "start", "meshes", "elements", "equilibrium", "particles", "seismic-coefficient",
+                                    "critical-seismic"})  # fmt: skip
     return options
 
 
@@ -94,7 +107,30 @@ def safety(a: Namespace, cell_size: float, dilation_angle: float) -> bridge.Coll
     """Weaken the soil to the last equilibrium on one mesh."""
     model = slope_fem(a, comm, cell_size, dilation_angle, a.depth)
     progress = step_line(f"cells of {cell_size:g} m, dilation angle {dilation_angle:g} degrees", "factor")
-    return bridge.factor_of_safety(model, weight(a.unit_weight), start=a.start, progress=progress)
+    load = shaken(weight(a.unit_weight), a.seismic_coefficient)
+    return bridge.factor_of_safety(model, load, start=a.start, progress=progress)
+
+
+def shaken(load: bridge.Load, coefficient: float, dim: int = 2) -> bridge.Load:
+    """The load with inertia along the first axis."""
+    return bridge.pseudo_static(load, [coefficient] + [0.0] * (dim - 1)) if coefficient else load
+
+
+def critical_seismic(model: bridge.QuasiStatic, load: bridge.Load, where: str) -> dict[str, object]:
+    """Raise the inertia on finite elements until they fail; entries of the summary, printed on the first rank. Collective."""
+    progress = step_line(where, "seismic coefficient")
+    model.solve(load, progress=progress)
+    if not model.converged:
+        raise mpm.InputError(
+            "--critical-seismic: the soil does not carry its weight without inertia, expected a factor of safety above 1"
+        )
+    dim = model.domain.geometry.dim
+    found = bridge.collapse_load(model, lambda k: shaken(load, k, dim), first_step=0.05, progress=progress)
+    if comm.rank == 0:
+        end = f"failure at {found.failed_at:.3f}" if found.failed else f"at least: {found.reason}"
+        print(f"critical seismic coefficient on the finest mesh: {found.value:.3f}, {end}")
+    return {"critical_seismic_coefficient": found.value, "failed_at_seismic_coefficient": found.failed_at,
+            "failure_shown_by_seismic_coefficient": found.failed}  # fmt: skip
 
 
 def averages(a: Namespace, laws: Iterable[Any]) -> bool:
@@ -113,7 +149,7 @@ def slope_by_particles(a: Namespace) -> bridge.ParticleSafety:
         model = mpm.Model(background, bridge.reduced_strength(soil_of(stiff), factor))
         model.seed(density=a.unit_weight / GRAVITY, per_cell=3, cell_tag=bridge.SOIL)
         bridge.apply_supports(model, SUPPORTS)
-        model.set_gravity((0.0, -GRAVITY))
+        model.set_gravity((a.seismic_coefficient * GRAVITY, -GRAVITY))
         return model
 
     nmd = averages(a, [soil_of(a)])
@@ -122,8 +158,16 @@ def slope_by_particles(a: Namespace) -> bridge.ParticleSafety:
 
 def site_by_particles(a: Namespace, site: Site) -> bridge.ParticleSafety:
     """The factor of a site by particles. Collective."""
+
+    def weakened(factor: float) -> mpm.Model:
+        model = site.particles(3, bridge.reduced_strength(site.laws, factor, site.tags_of(a.unreduced)))
+        gravity = model.gravity
+        gravity[0] += a.seismic_coefficient * GRAVITY
+        model.set_gravity(gravity)
+        return model
+
     return bridge.particle_safety(
-        lambda factor: site.particles(3, bridge.reduced_strength(site.laws, factor, site.tags_of(a.unreduced))),
+        weakened,
         start=a.start,
         nmd=averages(a, site.laws.values()),
         progress=step_line("particles", "factor"),
@@ -139,12 +183,32 @@ def particle_summary(found: bridge.ParticleSafety) -> dict[str, object]:
             "failure_shown_by_particles": found.failed}  # fmt: skip
 
 
+def critical_slope(a: Namespace) -> dict[str, object]:
+    """The critical seismic coefficient of the slope on the finest mesh, and by limit analysis. Collective."""
+    soil = a.height, a.angle, a.cohesion, a.friction_angle, a.unit_weight
+    angle = dilation_angles(a)[0]
+    found = critical_seismic(
+        slope_fem(a, comm, a.cell_size, angle, a.depth), weight(a.unit_weight), f"cells of {a.cell_size:g} m"
+    )
+    limit = bridge.log_spiral_seismic(*soil, depth=a.depth)
+    if comm.rank == 0:
+        print(f"critical seismic coefficient by limit analysis, associated flow: {limit:.3f}")
+    return found | {"limit_analysis_seismic_coefficient": limit}
+
+
+def site_load(site: Site, model: bridge.QuasiStatic) -> bridge.Load:
+    """Its load, after its stages if it has some. Collective."""
+    return bridge.FemSite(model).place(site.stages) if site.stages else site.load()
+
+
 def slip_line(a: Namespace, factor: float) -> np.ndarray | None:
     """Slip line of limit analysis with the strength divided by the factor of safety; None where the surface slides."""
     reduced = float(np.degrees(np.arctan(np.tan(np.radians(a.friction_angle)) / factor)))
-    if reduced >= a.angle:
+    if reduced >= a.angle + np.degrees(np.arctan(a.seismic_coefficient)):
         return None
-    return bridge.log_spiral(a.height, a.angle, a.cohesion / factor, reduced, a.crest, depth=a.depth).curve
+    return bridge.log_spiral(
+        a.height, a.angle, a.cohesion / factor, reduced, a.crest, depth=a.depth, seismic=a.seismic_coefficient
+    ).curve
 
 
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
@@ -168,15 +232,21 @@ def main(arguments: list[str] | None = None) -> int:
 
         def factor(site, model, progress):
             unreduced = site.tags_of(a.unreduced)
-            load = bridge.FemSite(model).place(site.stages) if site.stages else site.load()
+            load = shaken(site_load(site, model), a.seismic_coefficient, model.domain.geometry.dim)
             return bridge.factor_of_safety(model, load, start=a.start, progress=progress, unreduced=unreduced)
 
-        return site_study(a, factor, "factor_of_safety", "Factor of safety [-]",
-                          lambda site: particle_summary(site_by_particles(a, site)) if a.particles else {},
-                          at_once=a.particles)  # fmt: skip
+        def more(site):
+            found = particle_summary(site_by_particles(a, site)) if a.particles else {}
+            if a.critical_seismic:
+                model = site.finite_elements(**finite_elements(a))
+                found |= critical_seismic(model, site_load(site, model), "site")
+            return found
+
+        return site_study(a, factor, "factor_of_safety", "Factor of safety [-]", more, at_once=a.particles)
     start = perf_counter()
     folder = open_results(a, comm)
-    limit = bridge.log_spiral_safety(a.height, a.angle, a.cohesion, a.friction_angle, a.unit_weight, depth=a.depth)
+    soil = a.height, a.angle, a.cohesion, a.friction_angle, a.unit_weight
+    limit = bridge.log_spiral_safety(*soil, depth=a.depth, seismic=a.seismic_coefficient)
     sizes = mesh_sizes(a)
     runs = {angle: [safety(a, size, angle) for size in sizes] for angle in dilation_angles(a)}
     found = CollapseRuns(target(limit), a.friction_angle, sizes, runs)
@@ -185,6 +255,7 @@ def main(arguments: list[str] | None = None) -> int:
     summary = {
         **found.summary(),
         **(particle_summary(slope_by_particles(a)) if a.particles else {}),
+        **(critical_slope(a) if a.critical_seismic else {}),
         "curve_factor": curve[:, 0],
         "curve_largest_displacement_m": curve[:, 1],
         "wall_seconds": perf_counter() - start,

@@ -112,6 +112,8 @@ def _in_words(fem: Any, load: Any) -> str:
     """A load as text, without the components that are not given."""
     weight = load.unit_weight.items() if isinstance(load.unit_weight, dict) else [(None, load.unit_weight)]
     parts = [f"unit weight {w:.5g} N/m3{_of(fem.cell_tags, tag)}" for tag, w in weight if w]
+    forces = load.body_force.items()
+    parts += [f"body force {tuple(map(float, b))} N/m3{_of(fem.cell_tags, tag)}" for tag, b in forces if np.any(b)]
     parts += [f"pressure {p:.5g} Pa{_of(fem.facet_tags, tag)}" for tag, p in load.pressure.items() if p]
     parts += [f"traction {tuple(map(float, t))} Pa{_of(fem.facet_tags, tag)}" for tag, t in load.traction.items()]
     parts += [f"{load.displacement:.3g} of the prescribed displacements"] if load.displacement else []

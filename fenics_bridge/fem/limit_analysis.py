@@ -45,27 +45,29 @@ def log_spiral(
     crest: float = 0.0,
     *,
     depth: float | None = None,
+    seismic: float = 0.0,
 ) -> LogSpiral:
     """Least upper bound of the collapse load over all spirals, with associated flow.
 
-    Equates the work of the weight with the dissipation along the spiral (Chen 1975, Limit Analysis and Soil Plasticity,
-    ch. 9). Without friction the spirals are circles, and those that end before the toe are the base failures of Taylor (1937,
+    Equates the work of the weight, and of horizontal inertia forces beside it, with the dissipation along the spiral (Chen 1975,
+    Limit Analysis and Soil Plasticity, ch. 9). Without friction the spirals are circles, and those that end before the toe are the base failures of Taylor (1937,
     Stability of earth slopes).
 
     Args:
         height: height of the slope [m].
-        angle: angle of the slope [degrees], above the friction angle.
+        angle: angle of the slope [degrees], above the friction angle less atan(seismic).
         cohesion: cohesion of the soil [Pa].
         friction_angle: friction angle of the soil [degrees].
         crest: horizontal coordinate of the shoulder [m].
         depth: of the ground of the same soil below the toe [m], into which spirals may reach: they end before the toe, at the
             toe, or on the slope. None: they end at the toe, however deep they dip below its level before; `curve` of the
             result shows it.
+        seismic: horizontal seismic coefficient, the inertia force out of the slope over the weight [-], from 0 on.
 
     Raises:
         InputError: angles or lengths out of range, or a slope so little steeper than the friction angle that it always stands.
     """
-    slope = _checked(height, angle, cohesion, friction_angle, depth)
+    slope = _checked(height, angle, cohesion, friction_angle, depth, seismic)
     warn_of_radians(angle=angle, friction_angle=friction_angle)
     best = _best(slope)
     if not np.isfinite(best.load):
@@ -86,6 +88,7 @@ def log_spiral_safety(
     unit_weight: float,
     *,
     depth: float | None = None,
+    seismic: float = 0.0,
 ) -> float:
     """Factor of safety of a slope by the mechanism of `log_spiral`: the strength divided by it just fails at the unit weight.
 
@@ -95,7 +98,7 @@ def log_spiral_safety(
         cohesion: cohesion of the soil [Pa].
         friction_angle: friction angle of the soil [degrees].
         unit_weight: unit weight of the soil [N/m3].
-        depth: see `log_spiral`.
+        depth, seismic: see `log_spiral`.
 
     Raises:
         InputError: angles or lengths out of range.
@@ -107,11 +110,45 @@ def log_spiral_safety(
     for _ in range(24):
         factor = math.sqrt(low * high)
         reduced = math.degrees(math.atan(math.tan(math.radians(friction_angle)) / factor))
-        stands = reduced >= angle or (
-            _best(_checked(height, angle, cohesion, reduced, depth)).load * cohesion / factor > unit_weight * height
+        stands = reduced >= angle + _tilt(seismic) or (
+            _best(_checked(height, angle, cohesion, reduced, depth, seismic)).load * cohesion / factor
+            > unit_weight * height
         )
         low, high = (factor, high) if stands else (low, factor)
     return factor
+
+
+def log_spiral_seismic(
+    height: float,
+    angle: float,
+    cohesion: float,
+    friction_angle: float,
+    unit_weight: float,
+    *,
+    depth: float | None = None,
+) -> float:
+    """Critical seismic coefficient of a slope: the horizontal inertia force over the weight at which `log_spiral` fails [-].
+
+    Args:
+        height, angle, cohesion, friction_angle, unit_weight, depth: see `log_spiral_safety`.
+
+    Raises:
+        InputError: angles or lengths out of range, or a slope that does not stand without inertia.
+    """
+    factor = log_spiral_safety(height, angle, cohesion, friction_angle, unit_weight, depth=depth)
+    if factor < 1:
+        raise InputError(
+            f"unit_weight is {unit_weight!r} N/m3, expected a slope that stands: its factor is {factor:.3f}"
+        )
+    low, high = 0.0, 100.0
+    for _ in range(24):
+        seismic = 0.5 * (low + high)
+        stands = friction_angle >= angle + _tilt(seismic) or (
+            _best(_checked(height, angle, cohesion, friction_angle, depth, seismic)).load * cohesion
+            > unit_weight * height
+        )
+        low, high = (seismic, high) if stands else (low, seismic)
+    return seismic
 
 
 class _Slope(NamedTuple):
@@ -123,6 +160,8 @@ class _Slope(NamedTuple):
     """Tangent of the friction angle"""
     depth: float | None
     """Of the ground below the toe over the height of the slope"""
+    seismic: float
+    """Horizontal inertia force over the weight"""
 
 
 class _Mechanisms(NamedTuple):
@@ -138,18 +177,28 @@ class _Mechanisms(NamedTuple):
     """Shape (..., k, 2)"""
 
 
-def _checked(height: float, angle: float, cohesion: float, friction_angle: float, depth: float | None) -> _Slope:
-    if not 0 <= friction_angle < angle <= 90:
+def _tilt(seismic: float) -> float:
+    """Angle by which horizontal inertia tilts the weight [degrees]."""
+    return math.degrees(math.atan(seismic))
+
+
+def _checked(
+    height: float, angle: float, cohesion: float, friction_angle: float, depth: float | None, seismic: float
+) -> _Slope:
+    if not 0 <= seismic < math.inf:
+        raise InputError(f"seismic is {seismic!r}, expected a number of at least 0")
+    if not (0 <= friction_angle < angle + _tilt(seismic) and 0 < angle <= 90):
+        less = " < angle" if seismic == 0 else f" < angle + atan({seismic:g})"
         raise InputError(
             f"angle is {angle!r} degrees with friction_angle={friction_angle!r}; expected "
-            "0 <= friction_angle < angle <= 90"
+            f"0 <= friction_angle{less}, and angle <= 90"
         )
     if not (height > 0 and cohesion > 0):
         raise InputError(f"height and cohesion are {height!r} m, {cohesion!r} Pa, expected positive numbers")
     if depth is not None and not 0 <= depth < math.inf:
         raise InputError(f"depth is {depth!r} m, expected a number of at least 0, or None")
     return _Slope(
-        math.radians(angle), math.tan(math.radians(friction_angle)), None if depth is None else depth / height
+        math.radians(angle), math.tan(math.radians(friction_angle)), None if depth is None else depth / height, seismic
     )
 
 
@@ -171,8 +220,12 @@ def _searched(mechanisms: Any, slope: _Slope) -> _Mechanisms:
 
 
 def _through_slope(slope: _Slope, start_fraction: Any, end_fraction: Any) -> _Mechanisms:
-    """Spirals that end at the toe, or so far above it, on the slope, that they reach no deeper than the ground."""
-    start = start_fraction * np.pi / 2
+    """Spirals that end at the toe, or so far above it, on the slope, that they reach no deeper than the ground.
+
+    Below the pole they are inclined by the friction angle, as much as slopes that fail by their weight are at least. Inertia lets
+    flatter slopes fail as well, by spirals that start further, where they are level at most.
+    """
+    start = start_fraction * (np.pi / 2 + (math.atan(slope.tangent) if slope.seismic > 0 else 0.0))
     end = start + end_fraction * (np.pi - start)
     x, y = _points(slope, start, end)
     rise = y[..., 0] - y[..., -1]
@@ -184,8 +237,9 @@ def _through_slope(slope: _Slope, start_fraction: Any, end_fraction: Any) -> _Me
 def _before_toe(slope: _Slope, start_fraction: Any, end_fraction: Any) -> _Mechanisms:
     """Spirals that rise to the ground before the toe, and reach no deeper than the ground.
 
-    The pole is above the middle of the slope, as far as the toe is above the spiral: a slope further to the left has lost soil
-    that drives, one further to the right has soil that resists.
+    Without inertia the pole is above the middle of the slope, as far as the toe is above the spiral: a slope further to the left
+    has lost soil that drives, one further to the right has soil that resists. With it the same holds of the line from the pole
+    along the tilted weight.
     """
     assert slope.depth is not None
     start = start_fraction * np.pi / 2
@@ -200,7 +254,8 @@ def _before_toe(slope: _Slope, start_fraction: Any, end_fraction: Any) -> _Mecha
     x, y = _points(slope, start, end)
     height = y[..., 0] - y[..., -1]
     back = height / math.tan(slope.angle)
-    toe = np.minimum(np.maximum(0.5 * back, x[..., 0] + back), x[..., -1])
+    middle = 0.5 * back - slope.seismic * 0.5 * (y[..., 0] + y[..., -1])
+    toe = np.minimum(np.maximum(middle, x[..., 0] + back), x[..., -1])
     return _mechanisms(slope, end - start, (x, y), toe, height)
 
 
@@ -225,7 +280,7 @@ def _mechanisms(slope: _Slope, swept: Any, spiral: tuple[_Array, _Array], toe: A
         surface = y[..., -1:] + np.clip((corners[..., 2:3] - x) * math.tan(slope.angle), 0, rise[..., None])
         is_below = (y <= surface + 1e-9).all(axis=-1)
         around = np.concatenate([x, corners[..., 2:0:-1]], axis=-1), np.concatenate([y, y[..., [-1, 0]]], axis=-1)
-        moment = _moment(*around)
+        moment = _moment(*around) + slope.seismic * _moment(around[1], -around[0])
         ratio = np.exp(2 * swept * slope.tangent)
         dissipation = (ratio - 1) / (2 * slope.tangent) if slope.tangent > 0 else swept
         is_possible = is_below & (moment > 0) & (rise > 0) & (shoulder >= x[..., 0])
@@ -234,6 +289,11 @@ def _mechanisms(slope: _Slope, swept: Any, spiral: tuple[_Array, _Array], toe: A
 
 
 def _moment(x: _Array, y: _Array) -> Any:
-    """First moment about the pole of the soil's areas; the soil to the left of the pole goes down."""
-    x_next, y_next = np.roll(x, -1, axis=-1), np.roll(y, -1, axis=-1)
-    return -np.sum((x + x_next) * (x * y_next - x_next * y), axis=-1) / 6
+    """Moment of the weight about the pole, over the unit weight; the soil to the left of the pole goes down.
+
+    Taken about the first point at first, as the pole may be so far away that hardly a digit would be left.
+    """
+    u, v = x - x[..., :1], y - y[..., :1]
+    u_next, v_next = np.roll(u, -1, axis=-1), np.roll(v, -1, axis=-1)
+    cross = u * v_next - u_next * v
+    return -np.sum((u + u_next) * cross, axis=-1) / 6 - x[..., 0] * np.sum(cross, axis=-1) / 2

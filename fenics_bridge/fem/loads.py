@@ -39,9 +39,19 @@ class Load:
     """Fraction of the forces that were out of balance when the present stage began and are still held [-], see `Stage`"""
     traction: dict[int | str, Sequence[float]] = field(default_factory=dict)
     """Force per area [Pa], shape (D,), by facet tag or name, on the undeformed outer boundary, for instance shear"""
+    body_force: dict[int | str | None, Sequence[float]] = field(default_factory=dict)
+    """Force per volume [N/m3], shape (D,), beside the weight, by cell tag or name; by None in the cells of all other tags. Inertia
+    forces of an earthquake, for instance: `pseudo_static`"""
 
     def __repr__(self) -> str:
-        units = {"unit_weight": "N/m3", "pressure": "Pa", "traction": "Pa", "displacement": "of it", "held": "of it"}
+        units = {
+            "unit_weight": "N/m3",
+            "body_force": "N/m3",
+            "pressure": "Pa",
+            "traction": "Pa",
+            "displacement": "of it",
+            "held": "of it",
+        }
         shown = (f"{name}={getattr(self, name)} {unit}" for name, unit in units.items() if getattr(self, name))
         return f"Load({', '.join(shown)})"
 
@@ -59,29 +69,32 @@ class Load:
         def between_tags(a: Any, b: Any) -> Any:
             return {tag: between(a.get(tag, a.get(None, 0.0)), b.get(tag, b.get(None, 0.0))) for tag in {*a, *b}}
 
+        def between_vectors(name: str) -> Any:
+            ends = (_arrays(name, getattr(load, name)) for load in (self, other))
+            return {tag: tuple(vector) for tag, vector in between_tags(*ends).items()}
+
         weights = self.unit_weight, other.unit_weight
         by_tag = any(isinstance(weight, dict) for weight in weights)
         return Load(
-            between_tags(*map(_weight_by_tag, weights)) if by_tag else between(*weights),
+            between_tags(*map(weight_by_tag, weights)) if by_tag else between(*weights),
             between_tags(self.pressure, other.pressure),
             between(self.displacement, other.displacement),
             between(self.held, other.held),
-            {
-                tag: tuple(vector)
-                for tag, vector in between_tags(*map(_arrays, (self.traction, other.traction))).items()
-            },
+            between_vectors("traction"),
+            between_vectors("body_force"),
         )
 
 
 def require_finite(comm: MPI.Comm, load: Load) -> None:
     """Raise InputError on all ranks if a load has a value that is not finite on any. Collective."""
     problem = None
-    for name in ("unit_weight", "pressure", "traction", "displacement", "held"):
+    by_tag = {"pressure": "facet", "traction": "facet", "body_force": "cell"}
+    for name in ("unit_weight", "pressure", "traction", "body_force", "displacement", "held"):
         value = getattr(load, name)
-        if name in ("pressure", "traction") and not isinstance(value, dict):
-            problem = f"{name} is {value!r}, expected a dictionary by facet tag or name"
+        if name in by_tag and not isinstance(value, dict):
+            problem = f"{name} is {value!r}, expected a dictionary by {by_tag[name]} tag or name"
             continue
-        scalar = name != "traction"
+        scalar = name not in ("traction", "body_force")
         wrong = [v for v in (value.values() if isinstance(value, dict) else [value]) if not _is_finite(v, scalar)]
         if wrong:
             problem = f"{name} is {wrong[0]!r}, expected finite numbers"
@@ -93,13 +106,13 @@ def _is_finite(value: Any, scalar: bool) -> bool:
     return not (scalar and numbers.ndim) and numbers.dtype.kind in "iuf" and bool(np.isfinite(numbers).all())
 
 
-def _arrays(tractions: Any) -> Any:
-    return {tag: checks.real_numbers("traction", vector) for tag, vector in tractions.items()}
+def _arrays(name: str, vectors: Any) -> Any:
+    return {tag: checks.real_numbers(name, vector) for tag, vector in vectors.items()}
 
 
 def warn_of_weight(comm: MPI.Comm, load: Load) -> None:
     """Warn of a unit weight that no soil has, such as one in kN/m3 or one that acts upwards; none is fine."""
-    weights = [float(weight) for weight in _weight_by_tag(load.unit_weight).values()]
+    weights = [float(weight) for weight in weight_by_tag(load.unit_weight).values()]
     odd = [weight for weight in weights if weight and not is_unit_weight(abs(weight))]
     upwards = [weight for weight in weights if weight < 0]
     texts = []
@@ -117,7 +130,7 @@ def warn_of_weight(comm: MPI.Comm, load: Load) -> None:
         warnings.warn(text, RuntimeWarning, stacklevel=3)
 
 
-def _weight_by_tag(unit_weight: Any) -> Any:
+def weight_by_tag(unit_weight: Any) -> Any:
     """Unit weights by cell tag; None stands for the cells of all other tags."""
     return unit_weight if isinstance(unit_weight, dict) else {None: unit_weight}
 
@@ -173,7 +186,10 @@ class LoadVectors:
         """Forces of which the fraction `Load.held` acts, an array like `forces`, or 0"""
         self._space, self._facet_tags, self._cell_tags = space, facet_tags, cell_tags
         self._test = ufl.TestFunction(space) if test is None else test
-        self._weight = {None: self._unit_weight(ufl.dx)}
+        dim = space.mesh.geometry.dim
+        self._down = [0.0] * (dim - 1) + [-1.0]
+        self._weight = {None: self._unit_body_force(ufl.dx, self._down)}
+        self._body_force: dict[int | None, list[NDArray[np.float64]]] = {}
         extent = np.ptp(space.mesh.geometry.x, axis=0).max() if len(space.mesh.geometry.x) else 0.0
         self._size = space.mesh.comm.allreduce(float(extent), MPI.MAX) ** (space.mesh.geometry.dim - 1)
         self._pressure: dict[int, NDArray[np.float64]] = {}
@@ -196,11 +212,18 @@ class LoadVectors:
             Collective.
         """
         load = self.resolved(load)
-        by_tag = _weight_by_tag(load.unit_weight)
+        by_tag = weight_by_tag(load.unit_weight)
         elsewhere = by_tag.get(None, 0.0)
         forces = elsewhere * self._weight[None]
         for tag in sorted(tag for tag in by_tag if tag is not None):
             forces = forces + (by_tag[tag] - elsewhere) * self._unit_weight_of(tag)
+        everywhere = np.zeros(self._space.mesh.geometry.dim)
+        for tag in sorted(load.body_force, key=lambda tag: (tag is not None, tag or 0)):
+            vector = _vector(self._space.mesh, load.body_force[tag], "body_force")
+            beside = vector - everywhere
+            everywhere = vector if tag is None else everywhere
+            for component, unit in zip(beside, self._unit_body_forces(tag)):
+                forces = forces + component * unit
         for tag, pressure in load.pressure.items():
             forces = forces + pressure * self._unit_pressure(tag)
         for tag, traction in load.traction.items():
@@ -228,9 +251,11 @@ class LoadVectors:
             weight = by_number(comm, self._cell_tags, weight, "unit_weight", "cell")
         pressure = by_number(comm, self._facet_tags, load.pressure, "pressure")
         traction = by_number(comm, self._facet_tags, load.traction, "traction")
-        for vector in traction.values():
-            _vector(self._space.mesh, vector)
-        return replace(load, unit_weight=weight, pressure=pressure, traction=traction)
+        body_force = by_number(comm, self._cell_tags, load.body_force, "body_force", "cell")
+        for name, vectors in (("traction", traction), ("body_force", body_force)):
+            for vector in vectors.values():
+                _vector(self._space.mesh, vector, name)
+        return replace(load, unit_weight=weight, pressure=pressure, traction=traction, body_force=body_force)
 
     def require_acting(self, load: Load, before: Load) -> None:
         """Require that pressures and tractions that a load brings in act on the surface of the soil.
@@ -253,20 +278,31 @@ class LoadVectors:
                 text = f"{name}: no facet with the tag {label(self._facet_tags, tag)} is on the surface of the soil, expected one there"
                 agree(comm, text if force <= 1e-12 * self._size else None)
 
-    def _unit_weight(self, dx: Any) -> Any:
-        domain, dim = self._space.mesh, self._space.mesh.geometry.dim
-        down = fem.Constant(domain, np.array([0.0] * (dim - 1) + [-1.0]))
+    def _unit_body_force(self, dx: Any, axis: ArrayLike) -> Any:
+        along = fem.Constant(self._space.mesh, np.array(axis))
         there = 1.0 if self.active is None else self.active
         return assembled(
-            fem.form(weighted(there * ufl.inner(down, self._test), self._radius) * dx), self._space
+            fem.form(weighted(there * ufl.inner(along, self._test), self._radius) * dx), self._space
         ).array.copy()
+
+    def _cells_of(self, tag: Any) -> Any:
+        """Measure of the cells of a tag; None stands for all cells."""
+        if tag is None:
+            return ufl.dx
+        domain = self._space.mesh
+        return ufl.Measure("dx", domain=domain, subdomain_data=numbered_anew(domain, self._cell_tags, [[tag]]))(1)
 
     def _unit_weight_of(self, tag: Any) -> Any:
         if tag not in self._weight:
-            domain = self._space.mesh
-            of_tag = numbered_anew(domain, self._cell_tags, [[tag]])
-            self._weight[tag] = self._unit_weight(ufl.Measure("dx", domain=domain, subdomain_data=of_tag)(1))
+            self._weight[tag] = self._unit_body_force(self._cells_of(tag), self._down)
         return self._weight[tag]
+
+    def _unit_body_forces(self, tag: Any) -> Any:
+        """Nodal forces of 1 N/m3 along each axis in the cells of a tag, or in all."""
+        if tag not in self._body_force:
+            dx = self._cells_of(tag)
+            self._body_force[tag] = [self._unit_body_force(dx, axis) for axis in np.eye(self._space.mesh.geometry.dim)]
+        return self._body_force[tag]
 
     def _unit_pressure(self, tag: Any) -> Any:
         if tag not in self._pressure:
@@ -333,9 +369,9 @@ def elastic_load(
     return work
 
 
-def _vector(domain: Mesh, traction: ArrayLike) -> NDArray[np.float64]:
-    """A traction (D,) [Pa]. Collective."""
-    vector, dim = real_numbers(domain.comm, "traction", traction), domain.geometry.dim
+def _vector(domain: Mesh, given: ArrayLike, name: str = "traction") -> NDArray[np.float64]:
+    """A traction [Pa] or body force [N/m3], (D,). Collective."""
+    vector, dim = real_numbers(domain.comm, name, given), domain.geometry.dim
     good = vector.shape == (dim,) and bool(np.isfinite(vector).all())
-    agree(domain.comm, None if good else f"traction is {traction!r}, expected {dim} finite numbers")
+    agree(domain.comm, None if good else f"{name} is {given!r}, expected {dim} finite numbers")
     return vector

@@ -126,7 +126,7 @@ class PoreWater(Conditions):
         if self.comm.allreduce(len(self.particles)) == 0:
             raise InputError("the model has no particles, expected them before add_water()")
         water, n, k, filled = collectively(self.comm, checked)
-        is_moist = self.comm.allreduce(bool((filled < 1).any()), MPI.LOR)
+        is_moist = self.comm.allreduce(bool((filled < 1).any()) or len(self.particles.saturation) > 0, MPI.LOR)
         warn_of_water_density(self.comm, water.density)
         self._core.water = water
         self.particles.set("porosity", n)

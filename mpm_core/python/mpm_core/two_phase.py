@@ -61,7 +61,7 @@ def of_suction(model: Model) -> str:
 def refuse_two_phases(model: Model, scheme: str) -> None:
     """Raises InputError for moist soil, or after an explicit run, in which the water has a velocity of its own. Collective."""
     water = model._core.water
-    moist = water is not None and not water.may_dry and len(model.particles.saturation) > 0
+    moist = water is not None and not water.may_dry and bool((model.particles.saturation < 1).any())
     if model.comm.allreduce(moist, MPI.LOR):
         raise InputError(
             f"saturation is less than 1 in parts of the soil, which {scheme} does not support; expected a retention curve in its place"

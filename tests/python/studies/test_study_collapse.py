@@ -45,6 +45,19 @@ def test_factor_of_safety(tmp_path):
     assert (tmp_path / "factor_displacement.png").exists() and (tmp_path / "mechanism.png").exists()
 
 
+def test_an_earthquake_as_a_force_that_stays(tmp_path):
+    """From above, coarse cells to 8 %. With the critical coefficient as the coefficient the factor is 1."""
+    slope = ["--cohesion", "2500", "--crest", "2", "--cell-size", "0.2", "--meshes", "1", "--no-without-dilation"]
+    summary = summary_of("safety", tmp_path / "a", *slope, "--seismic-coefficient", "0.15", "--critical-seismic")
+    assert summary["limit_analysis_factor_of_safety"] == pytest.approx(1.297, rel=1e-3)
+    assert summary["limit_analysis_seismic_coefficient"] == pytest.approx(0.348, rel=2e-3)
+    assert 1 < summary["factor_of_safety"] / summary["limit_analysis_factor_of_safety"] < 1.06
+    critical = summary["critical_seismic_coefficient"]
+    assert 1 < critical / summary["limit_analysis_seismic_coefficient"] < 1.08
+    again = summary_of("safety", tmp_path / "b", *slope, "--seismic-coefficient", str(critical))
+    assert again["factor_of_safety"] == pytest.approx(1.0, abs=5e-3)
+
+
 @pytest.mark.parametrize(("friction_angle", "tolerance"), [(0, 0.02), (20, 0.05)])
 def test_bearing_capacity(tmp_path, friction_angle, tolerance):
     """Prandtl: 2 + pi; 14.83 for 20 degrees."""
@@ -72,6 +85,7 @@ def test_bearing_capacity(tmp_path, friction_angle, tolerance):
             ["--unit-weight", "200e3", "--start", "1", "--cell-size", "0.2", "--meshes", "1"],
             ["start", "only", "of the load is carried", "mechanism"],
         ),
+        ("safety", ["--seismic-coefficient", "-0.1"], ["--seismic-coefficient is -0.1, expected at least 0"]),
         ("footing", ["--dilation-angle", "10"], ["--dilation-angle", "10", "--friction-angle"]),
     ],
 )

@@ -64,6 +64,13 @@ def test_a_stiff_layer_below_the_worst_spiral_changes_nothing():
     assert yield_acceleration(*steep, 9.81, 5.0) == pytest.approx(yield_acceleration(*steep), abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    "slope", [(10.0, 30.0, 15e3, 30.0, 18e3), (1.0, 45.0, 1e3, 25.0, 20e3), (10.0, 60.0, 30e3, 20.0, 20e3), (10.0, 22.0, 3e3, 35.0, 19e3)]
+)  # fmt: skip
+def test_yield_accelerations_are_those_of_limit_analysis_with_a_seismic_coefficient(slope):
+    assert yield_acceleration(*slope) / 9.81 == pytest.approx(bridge.log_spiral_seismic(*slope), rel=1e-3)
+
+
 @pytest.mark.parametrize("depth", [2.0, 10.0])
 def test_a_slope_at_its_factor_of_safety_above_a_stiff_layer_does_not_hold_any_acceleration(depth):
     # The factor of safety has the spirals through the toe and those that end before it, so that the former alone yield later.

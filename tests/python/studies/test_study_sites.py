@@ -108,6 +108,20 @@ def test_without_friction_more_weight_is_as_less_strength(tmp_path):
     assert high - low <= 4e-3 * low
 
 
+def test_a_site_is_shaken_along_the_first_axis(tmp_path):
+    """Its right side is free, so that forces to the right weaken it, which fails at some coefficient, and forces to the left do not."""
+    path, factors = site_in(tmp_path), {}
+    for coefficient, more in ((0.0, ["--critical-seismic"]), (0.1, []), (-0.1, [])):
+        folder = tmp_path / f"{coefficient}"
+        options = ["--site", str(path), "--meshes", "1", "--seismic-coefficient", str(coefficient), *more]
+        assert importlib.import_module("safety").main([*options, "--output", str(folder)]) == 0
+        factors[coefficient] = json.loads((folder / "summary.json").read_text())
+    values = [factors[k]["factor_of_safety"] for k in (0.1, 0.0, -0.1)]
+    assert values[0] < 0.95 * values[1] and values[1] < values[2]
+    critical = factors[0.0]["critical_seismic_coefficient"]
+    assert (critical > 0.1) == (values[0] > 1) and critical > 0
+
+
 STAGES = """
 [[stages]]
 name = "in situ"

@@ -202,7 +202,8 @@ def test_input_that_explicit_water_cannot_work_with():
     ):
         model.add_water(porosity=0.4, conductivity=1e-3, saturation=0.5, suction_limit=0.0)
         model.implicit(1.0, dt=0.1)
-    model.add_water(porosity=0.4, conductivity=1e-3)
+    model.add_water(porosity=0.4, conductivity=1e-3)  # full again
+    assert model.particles.saturation.min() == 1
     with pytest.raises(mpm.InputError, match="above the critical time step"):
         list(model.explicit(1.0, dt=1.1 * model.wave_speeds().fast))
     with pytest.raises(mpm.InputError, match="which implicit\\(\\) does not support"):

@@ -1,0 +1,136 @@
+"""Body forces of a load, and inertia forces of an earthquake that act for good."""
+
+import numpy as np
+import pytest
+from bridge_cases import POISSON, YOUNG
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+COHESION, FRICTION_ANGLE = 2.5e3, 25.0
+SLOPE = 1.0, 45.0, COHESION, FRICTION_ANGLE, 20e3  # height, angle, strength, unit weight
+SHEAR_MODULUS = YOUNG / (2 * (1 + POISSON))
+LEFT, RIGHT, BASE = 1, 2, 3
+
+
+def two_layers():
+    """A block of quadratic elements, 1 m high, on a fixed base, whose sides move only sideways; BODY is its upper half."""
+    domain, cell_tags, facet_tags = bridge.box_mesh(MPI.COMM_SELF, (0.5, 1.0), (2, 4), body=((-1.0, 0.5), (1.0, 2.0)))
+    supports = [bridge.roller(LEFT, (0, 1)), bridge.roller(RIGHT, (0, 1)), bridge.fixed(BASE)]
+    law = mpm.LinearElastic(young=YOUNG, poisson=POISSON)
+    return bridge.QuasiStatic(domain, law, facet_tags, supports, 2, cell_tags=cell_tags)
+
+
+def test_a_body_force_shears_a_layer():
+    model = two_layers()
+    model.solve(bridge.Load(body_force={None: (3e3, 0.0)}))
+    x = np.array([[0.1, 0.3], [0.25, 0.7], [0.4, 1.0]])
+    moved = 3e3 / SHEAR_MODULUS * x[:, 1] * (1 - 0.5 * x[:, 1])  # G u'' = -f, without shear at the top
+    assert model.evaluate_at(x)["displacement"][:, 0] == pytest.approx(moved, rel=1e-6)
+    assert model.reaction(BASE) == pytest.approx([0.5 * 3e3, 0.0], abs=1e-6)
+
+
+def test_body_forces_of_cell_tags_stand_in_the_place_of_that_of_all_others():
+    model = two_layers()
+    model.solve(bridge.Load(body_force={None: (3e3, 0.0), bridge.BODY: (1e3, 0.0)}))  # of the upper half
+    assert model.reaction(BASE) == pytest.approx([0.25 * (3e3 + 1e3), 0.0], abs=1e-6)
+
+
+def test_inertia_is_a_part_of_the_unit_weight_of_each_soil():
+    weights = {None: 20e3, bridge.BODY: 16e3}
+    load = bridge.pseudo_static(bridge.Load(weights, body_force={bridge.BODY: (500.0, 0.0)}), (0.2, 0.1))
+    assert load.unit_weight == weights
+    assert load.body_force == {None: (4e3, 2e3), bridge.BODY: (3.7e3, 1.6e3)}
+    model = two_layers()
+    model.solve(load)
+    across, up = 0.25 * (4e3 + 3.7e3), 0.25 * (0.9 * 20e3 + 0.9 * 16e3)
+    walls = sum(model.reaction(tag)[1] for tag in (LEFT, RIGHT))
+    assert model.reaction(BASE)[0] == pytest.approx(across, rel=1e-9)
+    assert model.reaction(BASE)[1] + walls == pytest.approx(-up, rel=1e-9)
+    again = bridge.pseudo_static(load, (0.1, 0.0))
+    assert again.body_force[None] == (6e3, 2e3)
+
+
+def test_body_forces_rise_with_a_load_between_two():
+    low, high = bridge.Load(20e3), bridge.pseudo_static(bridge.Load(20e3), (0.2, 0.0))
+    assert low.towards(high, 0.25).body_force == {None: (1e3, 0.0)}
+    assert "body_force={None: (4000.0, 0.0)} N/m3" in repr(high)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ((1.0, 0.0), "body_force is \\(1.0, 0.0\\), expected a dictionary by cell tag or name"),
+        ({None: (1.0, 0.0, 0.0)}, "body_force is .*, expected 2 finite numbers"),
+        ({None: (np.nan, 0.0)}, "body_force is .*nan.*, expected finite numbers"),
+        ({77: (1.0, 0.0)}, "body_force: .*77"),
+    ],
+)
+def test_body_forces_that_no_soil_can_have(given, message):
+    with pytest.raises(bridge.InputError, match=message):
+        two_layers().solve(bridge.Load(body_force=given))
+
+
+@pytest.mark.parametrize("coefficients", [0.2, (0.2,), (np.inf, 0.0), "much"])
+def test_coefficients_that_are_none(coefficients):
+    with pytest.raises(bridge.InputError, match="coefficients is"):
+        bridge.pseudo_static(bridge.Load(20e3), coefficients)
+
+
+# --- slopes -----------------------------------------------------------------------------------------------------------
+
+
+def slope():
+    background = bridge.slope_mesh(MPI.COMM_SELF, height=1.0, angle=45.0, crest=2.0, cell_size=0.1, runout=0.1)
+    domain, _, facet_tags = bridge.soil_mesh(*background)
+    soil = mpm.MohrCoulomb(
+        young=200e3, poisson=0.33, cohesion=COHESION, friction_angle=FRICTION_ANGLE, dilation_angle=FRICTION_ANGLE
+    )
+    return bridge.QuasiStatic(
+        domain, soil, facet_tags, [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)], degree=2
+    )
+
+
+def test_a_shaken_slope_has_the_factor_of_limit_analysis():
+    """From above, to 3 % on cells of a tenth of the height."""
+    load = bridge.pseudo_static(bridge.Load(20e3), (0.2, 0.0))
+    found = bridge.factor_of_safety(slope(), load, start=1.0, first_step=0.1, tolerance=5e-3)
+    limit = bridge.log_spiral_safety(*SLOPE, seismic=0.2, depth=0.0)
+    assert limit < 0.8 * bridge.log_spiral_safety(*SLOPE, depth=0.0)
+    assert found.failed and 0.99 * limit < found.value < 1.03 * limit
+
+
+def test_a_slope_fails_at_its_critical_coefficient():
+    """From above, to 4 % on these cells."""
+    model = slope()
+    model.solve(bridge.Load(20e3))
+    shaken = lambda k: bridge.pseudo_static(bridge.Load(20e3), (k, 0.0))  # noqa: E731
+    found = bridge.collapse_load(model, shaken, first_step=0.2, tolerance=1e-2)
+    limit = bridge.log_spiral_seismic(*SLOPE, depth=0.0)
+    assert found.failed and 0.98 * limit < found.value < 1.04 * limit
+
+
+@pytest.mark.parametrize("depth", [None, 0.5])
+def test_with_its_critical_coefficient_a_slope_has_the_factor_one(depth):
+    critical = bridge.log_spiral_seismic(*SLOPE, depth=depth)
+    assert 0.2 < critical < 0.6
+    assert bridge.log_spiral_safety(*SLOPE, seismic=critical, depth=depth) == pytest.approx(1.0, abs=1e-4)
+    assert bridge.log_spiral(*SLOPE[:4], seismic=critical, depth=depth).unit_weight == pytest.approx(20e3, rel=1e-4)
+
+
+@pytest.mark.parametrize("angle", [10.0, 20.0, 28.0])
+def test_a_slope_flatter_than_the_friction_angle_fails_by_inertia(angle):
+    """A long one without cohesion does so at tan(phi - beta) of gravity, one with little cohesion at hardly more."""
+    critical = bridge.log_spiral_seismic(1.0, angle, 1.0, 32.0, 20e3)
+    infinite = np.tan(np.radians(32.0 - angle))
+    assert infinite < critical < infinite + 0.02
+
+
+def test_slopes_that_limit_analysis_has_no_coefficient_for():
+    with pytest.raises(bridge.InputError, match="expected a slope that stands: its factor is 0"):
+        bridge.log_spiral_seismic(1.0, 45.0, 1e3, 10.0, 40e3)
+    with pytest.raises(bridge.InputError, match="seismic is -0.1, expected a number of at least 0"):
+        bridge.log_spiral_safety(*SLOPE, seismic=-0.1)
+    with pytest.raises(bridge.InputError, match="friction_angle < angle \\+ atan\\(0.1\\)"):
+        bridge.log_spiral(1.0, 20.0, 1e3, 30.0, seismic=0.1)
