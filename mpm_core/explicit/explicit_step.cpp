@@ -19,7 +19,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace mpm::explicit_scheme
 {
@@ -289,18 +288,6 @@ NodeSums<G::dim> sums_of_phases(const Model<G>& model, std::size_t i)
     sums.internal[a] += water.internal[a];
   return sums;
 }
-
-/// Modulus over density of the fastest compression wave in a particle [m2/s2].
-template <class G, int D = G::dim>
-double wave_squared(const Model<G>& model, Index p, double modulus)
-{
-  const Particles<D>& particles = model.particles;
-  const double volume = particles.volume[p];
-  if (!has_two_phases(model))
-    return modulus * volume / particles.mass[p];
-  return fast_wave_squared(modulus, model.water->modulus, particles.porosity[0][p], particles.mass[p] / volume,
-                           particles.water_mass[0][p] / volume);
-}
 } // namespace
 
 template <class G>
@@ -325,38 +312,6 @@ double out_of_balance(const Model<G>& model, const Vector<G::dim>& gravity)
   return acting > 0 ? std::sqrt(squares[0] / acting) : 0;
 }
 
-template <class G>
-CriticalParticle critical_particle(const Model<G>& model)
-{
-  constexpr int D = G::dim;
-  CriticalParticle found;
-  for (const MaterialPoints<D>& points : {material_points(model), resting_points(model)})
-    for (const Run& run : points.runs)
-    {
-      const double h = smallest_altitude<D>(model.mesh.shapes[run.cell]);
-      const Law& law = points.laws[static_cast<std::size_t>(run.material)];
-      const bool differs = has_moduli_of_points(law);
-      double modulus = p_wave_modulus(law);
-      for (Index p = run.first; p < run.last; ++p)
-      {
-        if (differs)
-          modulus = limiting_modulus_of_particle(law, points.particles, p);
-        const double squared = h * h / wave_squared(model, p, modulus);
-        if (squared < found.squared_time)
-          found = {p, h, squared};
-      }
-    }
-  return found;
-}
-
-template <class G>
-double critical_time_step(const Model<G>& model)
-{
-  double squared = critical_particle(model).squared_time;
-  MPI_Allreduce(MPI_IN_PLACE, &squared, 1, MPI_DOUBLE, MPI_MIN, model.exchange.comm);
-  return std::sqrt(squared);
-}
-
 double pic_fraction_of_step(double fraction, double dt, double critical)
 {
   return fraction == 0 ? 0 : -std::expm1(dt / critical * std::log1p(-fraction)); // 1 for a fraction of 1
@@ -365,9 +320,7 @@ double pic_fraction_of_step(double fraction, double dt, double critical)
 #define INSTANTIATE(G)                                                                                                 \
   template void choose_forces(Model<G>&, Integration, Averages);                                                       \
   template void explicit_step(Model<G>&, const ExplicitOptions&, double);                                              \
-  template double out_of_balance(const Model<G>&, const Vector<G::dim>&);                                              \
-  template CriticalParticle critical_particle(const Model<G>&);                                                        \
-  template double critical_time_step(const Model<G>&);
+  template double out_of_balance(const Model<G>&, const Vector<G::dim>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)

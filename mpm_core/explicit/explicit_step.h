@@ -59,24 +59,6 @@ void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt);
 template <class G>
 double out_of_balance(const Model<G>& model, const Vector<G::dim>& gravity);
 
-/// The particle of this rank whose h_min / c_d is smallest.
-struct CriticalParticle
-{
-  Index particle = -1;                                           ///< its row, -1 where there is none
-  double altitude = 0;                                           ///< h_min of its cell [m]
-  double squared_time = std::numeric_limits<double>::infinity(); ///< (h_min / c_d)^2 [s2]
-};
-
-/// Finds it; c_d as in `critical_time_step`.
-template <class G>
-CriticalParticle critical_particle(const Model<G>& model);
-
-/// Critical time step (16): the smallest of h_min / c_d over the particles and resting cells, c_d = sqrt((K + 4G/3) /
-/// rho_p); with water that has its own velocity that of the fast wave. [s]
-/// @note Collective
-template <class G>
-double critical_time_step(const Model<G>& model);
-
 /// The PIC fraction of a step of dt [s] under which the particles' own velocities fade as fast in time whatever the
 /// step: 1 - (1 - fraction)^(dt / dt_cr).
 /// @param fraction  of a critical time step, in [0, 1]

@@ -1,5 +1,6 @@
 #include "explicit/run.h"
 
+#include "explicit/critical_step.h"
 #include "materials/laws/substeps.h"
 #include "model/contacts.h"
 #include "model/moving_cells.h"

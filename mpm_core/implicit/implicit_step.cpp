@@ -1,5 +1,6 @@
 #include "implicit/implicit_step.h"
 
+#include "explicit/critical_step.h"
 #include "explicit/explicit_step.h"
 #include "implicit/averaging.h"
 #include "implicit/balance.h"

@@ -1,6 +1,7 @@
 #include "python/bindings.h"
 
 #include "base/number_text.h"
+#include "explicit/critical_step.h"
 #include "explicit/run.h"
 #include "explicit/two_phase_step.h"
 #include "model/absorbing.h"

@@ -3,6 +3,7 @@
 
 #include "../cpp/boxes.h"
 
+#include "explicit/critical_step.h"
 #include "explicit/explicit_step.h"
 #include "implicit/implicit_step.h"
 #include "particles/seed.h"

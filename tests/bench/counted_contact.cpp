@@ -6,6 +6,7 @@
 #include "../cpp/boxes.h"
 #include "../cpp/sheets.h"
 
+#include "explicit/critical_step.h"
 #include "explicit/explicit_step.h"
 #include "particles/seed.h"
 
