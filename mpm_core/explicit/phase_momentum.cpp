@@ -24,14 +24,15 @@ PhaseForces<D> phase_forces(const VelocityField<G>& soil, const WaterField<G>& w
 {
   const NodeSums<D>& s = soil.nodes[i];
   const NodeSums<D>& w = water.motion.nodes[i];
+  const Vector<D> damping = water.motion.damping_force.empty() ? Vector<D>{} : water.motion.damping_force[i];
   PhaseForces<D> f{s.mass, is_light(water.motion, i) ? 0 : w.mass, water.nodes[i].drag, {}, {}, {}, {}};
   const double porosity =
       f.water_mass == 0 ? 0 : std::min(1.0, f.water_mass / (density * water.nodes[i].volume)); // filled part of it
   for (int a = 0; a < D; ++a)
   {
-    const double held = porosity * w.traction[a];
-    f.external_on_water[a] = f.water_mass * gravity[a] + held;
-    f.external_on_soil[a] = f.soil_mass * gravity[a] + s.traction[a] - held;
+    const double of_water = porosity * w.traction[a] + damping[a]; // of the traction, which acts on both
+    f.external_on_water[a] = f.water_mass * gravity[a] + of_water;
+    f.external_on_soil[a] = f.soil_mass * gravity[a] + s.traction[a] - of_water;
     f.on_water[a] = f.external_on_water[a] - porosity * w.internal[a];
     f.on_soil[a] = f.external_on_soil[a] - s.internal[a] - (1 - porosity) * w.internal[a];
   }

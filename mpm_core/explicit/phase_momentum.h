@@ -12,7 +12,9 @@ namespace mpm::explicit_scheme
 ///     R_w = m_w g + n P,  R_s = m_s g + t - f_int + (1 - n) P,  P = sum V_p p_p grad N,
 ///
 /// so that drag limits no time step. Local damping acts on both phases alike, by the sum of R_s and R_w: it leaves the
-/// flow of water through the soil alone. Where pressure is prescribed on a facet, n of it acts on the water.
+/// flow of water through the soil alone. Where pressure is prescribed on a facet, n of it acts on the water. The
+/// tractions t have the forces of Rayleigh damping on both phases, of which the water takes its own, see
+/// `add_rayleigh_forces`.
 /// @param density  of water [kg/m3]
 template <class G>
 void find_phase_accelerations(const Vector<G::dim>& gravity, double damping, double dt, double density,

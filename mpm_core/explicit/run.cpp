@@ -198,7 +198,8 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
       if (run.conversion)
         convert_failing(model, *run.conversion);
       const double critical = critical_time_step(model);
-      dt = next_step(model, run, damped_time_step(options.rayleigh, critical));
+      const double of_soil = options.rayleigh.stiffness > 0 ? critical_time_step_of_soil(model) : critical;
+      dt = next_step(model, run, damped_time_step(options.rayleigh, critical, of_soil));
       convert_near_surfaces(model, control_interval * dt);
       of_step.pic_fraction = pic_fraction_of_step(run.pic, dt, critical);
     }

@@ -37,6 +37,7 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
   follow_supports<G>(soil, water.motion, water.motion.start_velocity);
   add_wet_contact_forces(model, dt);
   close_sides<G>(soil, water, soil.start_velocity, water.motion.start_velocity);
+  add_rayleigh_forces(model, options.rayleigh, soil);
   add_forces_of_ground(mesh, gravity, model.time, dt, soil, &water.motion);
   // Momentum balance of both phases, coupled by the drag at the step's end
   clock.begin(Phase::momentum);
@@ -66,6 +67,8 @@ void two_phase_step(Model<G>& model, const ExplicitOptions& options, double dt)
   close_sides<G>(soil, water, soil.velocity, water.motion.velocity);
   clock.begin(Phase::momentum);
   add_phase_work(soil, water, exchange.owned, gravity, options.damping, dt, density, model.totals);
+  for (const VelocityField<G>* phase : {&soil, &water.motion})
+    note_rayleigh_work(exchange.owned, dt, *phase, model.totals);
   // Flow of the water through the soil, and volumetric strains
   clock.begin(Phase::averaging);
   find_flux(mesh, soil, *model.water, water);

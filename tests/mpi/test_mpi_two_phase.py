@@ -19,6 +19,7 @@ FIELDS = (
     "water_velocity",
     "water_mass",
 )
+DAMPING = mpm.Rayleigh(mass=5.0, stiffness=2e-4)
 
 
 def wet_slope(comm, owners_of=bands):
@@ -35,17 +36,19 @@ def slide(model, until=0.05, **options):
     return report
 
 
+@pytest.mark.parametrize("rayleigh", [None, DAMPING], ids=["undamped", "damped"])
 @pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
-def test_a_slide_of_two_phases_is_the_same_on_any_partition(comm, owners_of):
+def test_a_slide_of_two_phases_is_the_same_on_any_partition(comm, owners_of, rayleigh):
     model, alone = wet_slope(comm, owners_of), wet_slope(MPI.COMM_SELF)
-    report, expected = slide(model), slide(alone)
+    report, expected = slide(model, rayleigh=rayleigh), slide(alone, rayleigh=rayleigh)
     assert report.plastic_fraction > 0
     assert_same(all_by_id(model, FIELDS), all_by_id(alone, FIELDS), 1e-8)
     assert model.water_inflow() == pytest.approx(alone.water_inflow(), rel=1e-8)
     squared = [(one.averaged_pore_pressure() ** 2).sum() for one in (model, alone)]
     assert comm.allreduce(squared[0]) == pytest.approx(squared[1], rel=1e-8)
-    for name in ("mass", "kinetic_energy", "drag_work", "support_work", "unbalanced_ratio"):
+    for name in ("mass", "kinetic_energy", "drag_work", "damping_work", "support_work", "unbalanced_ratio"):
         assert getattr(report, name) == pytest.approx(getattr(expected, name), rel=1e-8)
+    assert (report.damping_work > 0) == (rayleigh is not None)
 
 
 def test_a_repartition_changes_nothing(comm):
@@ -58,18 +61,20 @@ def test_a_repartition_changes_nothing(comm):
     assert_same(all_by_id(model, FIELDS), all_by_id(alone, FIELDS), 1e-8)
 
 
-def test_a_restart_is_the_run_that_never_stopped(comm, tmp_path):
+@pytest.mark.parametrize("rayleigh", [None, DAMPING], ids=["undamped", "damped"])
+def test_a_restart_is_the_run_that_never_stopped(comm, tmp_path, rayleigh):
     path = comm.bcast(str(tmp_path / "wet.h5"))
     model = wet_slope(comm)
-    slide(model, 0.02)
+    slide(model, 0.02, rayleigh=rayleigh)
     model.save(path)
-    slide(model)
+    slide(model, rayleigh=rayleigh)
     again = wet_slope(comm)
     again.restore(path)
-    slide(again)
+    slide(again, rayleigh=rayleigh)
     for name, values in all_by_id(model, FIELDS).items():
         np.testing.assert_array_equal(all_by_id(again, FIELDS)[name], values, err_msg=name)
-    assert again.report().drag_work == model.report().drag_work
+    for name in ("drag_work", "damping_work"):
+        assert getattr(again.report(), name) == getattr(model.report(), name)
 
 
 def wet_block(comm, geometry, owners_of=bands):
@@ -121,16 +126,18 @@ def shaken_site(comm, owners_of=bands):
     return model
 
 
-def test_a_shaken_site_of_two_phases_is_the_same_on_any_partition(comm, shared_path):
+@pytest.mark.parametrize("rayleigh", [None, DAMPING], ids=["undamped", "damped"])
+def test_a_shaken_site_of_two_phases_is_the_same_on_any_partition(comm, shared_path, rayleigh):
+    options = {"damping": 0.0, "rayleigh": rayleigh}
     model, alone = shaken_site(comm, scattered), shaken_site(MPI.COMM_SELF)
-    report, _ = slide(model, 0.06, damping=0.0), slide(alone, 0.06, damping=0.0)
+    report, _ = slide(model, 0.06, **options), slide(alone, 0.06, **options)
     assert report.plastic_fraction > 0 and report.kinetic_energy > 0.1
     assert_same(all_by_id(model, FIELDS), all_by_id(alone, FIELDS), 1e-8)
     path = shared_path / "shaken.h5"
     model.save(path)
-    slide(model, 0.08, damping=0.0)
+    slide(model, 0.08, **options)
     again = shaken_site(comm, scattered)
     again.restore(path)
-    slide(again, 0.08, damping=0.0)
+    slide(again, 0.08, **options)
     for name, values in all_by_id(model, FIELDS).items():
         np.testing.assert_array_equal(all_by_id(again, FIELDS)[name], values, err_msg=name)

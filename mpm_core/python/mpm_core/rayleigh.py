@@ -19,10 +19,14 @@ class Rayleigh:
     A harmonic motion of angular frequency w is damped with the ratio ``mass / (2 w) + stiffness w / 2`` of the critical
     damping. It stands for the hysteresis of soil below its yield surface; where soil yields, its law damps alone.
 
+    In explicit runs with pore water, ``stiffness`` counts the effective stresses only, and ``mass`` acts on soil and water by the
+    velocity of the soil, so that it does not change the flow of water through the soil (docs/water.md).
+
     Args:
         mass: alpha [1/s]. It slows down all motion, that of a rigid body too.
         stiffness: beta [s]. It shortens the critical time step to ``sqrt(1 + x**2) - x`` times that without, with ``x`` some
-            ``stiffness`` over that step: to a fifth for x = 2.4.
+            ``stiffness`` over that step: to a fifth for x = 2.4. With pore water in explicit runs it does so by much less, since
+            the water's wave, by which the step is short, is not damped.
         plastic_strain: accumulated plastic deviatoric strain of a point above which its cell is no longer damped [-]; the
             stresses of ``stiffness`` would strengthen a shear band, and the forces of ``mass`` brake a slide. Infinite where they
             are to brake it, as in the place of local damping (docs/integration.md).
@@ -74,7 +78,7 @@ class Rayleigh:
         return 0.5 * (self.mass / omega + self.stiffness * omega)
 
     def time_step(self, critical: float) -> float:
-        """Critical time step [s] under this damping, from that without."""
+        """Critical time step [s] under this damping, from that without, of soil without water that has a velocity of its own."""
         ratio = self.stiffness / critical + 0.25 * self.mass * critical
         return critical * float(np.sqrt(1 + ratio**2) - ratio)
 

@@ -33,7 +33,7 @@ class Report:
     internal_work: float
     """Work of the nodal forces of the stresses"""
     damping_work: float
-    """Energy taken out by local damping"""
+    """Energy taken out by local and by Rayleigh damping"""
     support_work: float
     """Work of prescribed velocities"""
     drag_work: float

@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from ._core import InputError, Integration, StressUpdate
 from .rayleigh import Rayleigh
+from .water_checks import LABORATORY_GRAVITY
 
 if TYPE_CHECKING:
     from .body import Body
@@ -19,8 +20,9 @@ def begin_two_phases(model: Model, integration: Any, stress_update: Any, rayleig
     """Give the water of a model its own mass and velocity, unless it has them. Collective."""
     if model._core.water is None:
         return
-    _require_two_phases(model, integration, stress_update, rayleigh)
+    _require_two_phases(model, integration, stress_update)
     model._check_water()
+    _require_dissipation(model, rayleigh)
     if not model._core.has_two_phases:
         model._core.split_phases()
     set_impervious(model)
@@ -34,17 +36,37 @@ def set_impervious(body: Body) -> None:
         body._core.set_impervious(sorted(closed - pervious), sorted(pervious))
 
 
-def _require_two_phases(model: Model, integration: Any, stress_update: Any, rayleigh: Rayleigh) -> None:
+def _require_two_phases(model: Model, integration: Any, stress_update: Any) -> None:
     refused = {
         "several velocity fields": max(model._velocity_fields) > 0,
         "retention curves": model._core.water.may_dry,
-        "Rayleigh damping": rayleigh.mass > 0 or rayleigh.stiffness > 0,
         "DUAL_DOMAIN integration": integration == Integration.DUAL_DOMAIN,
         f"stress_update {stress_update}": stress_update != StressUpdate.MODIFIED_LAST,
     }
     for what, there in refused.items():
         if there:
             raise InputError(f"the model has pore water, expected an explicit run without {what}")
+
+
+def _require_dissipation(model: Model, rayleigh: Rayleigh) -> None:
+    """Raise InputError for mass damping that may do more work than the drag of the water takes out. Collective.
+
+    Forces alpha m v of the soil's velocity v on soil and water take out energy in all motions as long as alpha <=
+    4 g rho / (k rho_w); see ``add_rayleigh_forces`` in mpm_core/model/rayleigh.h.
+    """
+    if rayleigh.mass == 0:
+        return
+    p, water = model.particles, model._core.water
+    mass = p.mass + p.water_mass if model._core.has_two_phases else p.mass
+    factors = np.array([np.linalg.eigvalsh(tensor)[-1] for tensor in water.anisotropy] or np.ones(len(model.laws)))
+    conductivity = p.conductivity * factors[p.material]
+    limits = 4 * LABORATORY_GRAVITY * mass / (p.volume * water.density * conductivity)
+    limit = model.comm.allreduce(limits.min(initial=np.inf), MPI.MIN)
+    if rayleigh.mass > limit:
+        raise InputError(
+            f"rayleigh.mass is {rayleigh.mass:g} 1/s, expected at most {limit:g} 1/s, beyond which it could give energy to the "
+            "pore water of soil that conducts so well"
+        )
 
 
 def of_suction(model: Model) -> str:

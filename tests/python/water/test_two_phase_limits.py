@@ -189,8 +189,6 @@ def test_input_that_explicit_water_cannot_work_with():
         light.explicit(1.0)
     with pytest.raises(mpm.InputError, match="without DUAL_DOMAIN integration"):
         model.explicit(1.0, integration=mpm.Integration.DUAL_DOMAIN)
-    with pytest.raises(mpm.InputError, match="without Rayleigh damping"):
-        model.explicit(1.0, rayleigh=mpm.Rayleigh(mass=1.0))
     column(4).explicit(1e-4, rayleigh=mpm.Rayleigh(plastic_strain=np.inf)).last()  # damping of zero is none
     with pytest.raises(mpm.InputError, match="suction_limit is -1.0 Pa, expected 0 or more"):
         model.add_water(porosity=0.4, conductivity=1e-3, suction_limit=-1.0)

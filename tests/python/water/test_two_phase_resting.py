@@ -89,7 +89,17 @@ def test_conversion_in_motion_leaves_soil_and_water_alone(dim):
     assert (spread > 1e-3 * np.abs(model.particles.water_velocity).max()).all()
 
 
-@pytest.mark.parametrize("options", [{}, {"nmd": True}, {"pic": 0.02}, {"integration": mpm.Integration.MIXED}], ids=str)
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"nmd": True},
+        {"pic": 0.02},
+        {"integration": mpm.Integration.MIXED},
+        {"rayleigh": mpm.Rayleigh(mass=20.0, stiffness=1e-4, plastic_strain=np.inf), "nmd": True},
+    ],
+    ids=str,
+)
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_step_after_conversion_moves_soil_and_water_as_before(dim, options):
     require_same_steps(lambda: flowing(dim, kozeny_carman=True), options)
