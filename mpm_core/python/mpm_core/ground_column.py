@@ -119,7 +119,7 @@ class GroundColumn:
         self._own = 0.5 * self._mass[:, None] - self._coupled
         self._nodal_mass = to_levels(0.5 * self._mass, 0.5 * self._mass)
         highest = np.maximum(p_wave, [laws[k].p_wave_modulus for k in self._law])  # as it may become
-        speeds = np.sqrt(highest / self._density)
+        of_soil, speeds = self._density, np.sqrt(highest / self._density)
         self._base_moduli = self._moduli[0].copy()  # of the ground below, undrained where it has water
         self._water = None
         if layers.pores:
@@ -127,16 +127,14 @@ class GroundColumn:
             self._water = GroundWater(
                 self._thickness, self._mass, pores, water, layers.gravity, self.heights[-1], layers.time
             )
-            of_water = pores[:, -2]
-            speeds = np.sqrt([
-                fast_wave_squared(*row)
-                for row in np.column_stack(
-                    [highest, np.full(n, water.modulus), pores[:, 0], self._density - of_water, of_water]
-                )
-            ])  # fmt: skip
+            of_soil = self._density - pores[:, -2]
+            parts = np.column_stack([highest, np.full(n, water.modulus), pores[:, 0], of_soil, pores[:, -2]])
+            speeds = np.sqrt([fast_wave_squared(*row) for row in parts])
             self._base_moduli[-1] += self._water.stiffness[0]
-        critical = float((self._thickness / speeds).min())
-        self.dt = COURANT * rayleigh.time_step(critical)
+        critical, critical_of_soil = (
+            float((self._thickness / speed).min()) for speed in (speeds, np.sqrt(highest / of_soil))
+        )
+        self.dt = COURANT * rayleigh.time_step(critical, critical_of_soil)
         """Length of a step [s]"""
         self.velocity, self._displacement = np.zeros((n + 1, dim)), np.zeros(dim)
         self._steps = 0
@@ -180,10 +178,13 @@ class GroundColumn:
             change[:, :3] -= self._water.pressure_change[:, None]
         return change
 
+    def _velocity_of_soil(self) -> Floats:
+        """At the levels [m/s], (n + 1, D)."""
+        return self._water.velocity_of_soil(self.velocity) if self._water else self.velocity
+
     def _rates(self) -> Floats:
         """Derivative of the velocity of the soil by height, (n, D)."""
-        velocity = self._water.velocity_of_soil(self.velocity) if self._water else self.velocity
-        return np.diff(velocity, axis=0) / self._thickness[:, None]
+        return np.diff(self._velocity_of_soil(), axis=0) / self._thickness[:, None]
 
     def _is_damped(self) -> NDArray[np.bool_]:
         if self._state.shape[1] == 0:
@@ -209,9 +210,9 @@ class GroundColumn:
         if self._water:
             force[:, -1] += self._water.loads_of(self.time)
             self._water.accelerate(self.dt, force, self._is_held(), self.time)
-        if self._rayleigh.mass > 0:
+        if self._rayleigh.mass > 0:  # as gravity, on soil and water alike (docs/water.md)
             half = 0.5 * self._rayleigh.mass * self._mass * damped
-            force -= to_levels(half, half)[:, None] * self.velocity
+            force -= to_levels(half, half)[:, None] * self._velocity_of_soil()
         change = self.dt * force / self._nodal_mass[:, None]
         self._take(change)
         self._displacement += self.dt * self.velocity[0]

@@ -77,9 +77,14 @@ class Rayleigh:
         omega = 2 * np.pi * frequencies
         return 0.5 * (self.mass / omega + self.stiffness * omega)
 
-    def time_step(self, critical: float) -> float:
-        """Critical time step [s] under this damping, from that without, of soil without water that has a velocity of its own."""
-        ratio = self.stiffness / critical + 0.25 * self.mass * critical
+    def time_step(self, critical: float, critical_of_soil: float | None = None) -> float:
+        """Critical time step [s] under this damping, from that without.
+
+        Args:
+            critical: [s].
+            critical_of_soil: that of the stresses and the mass of the soil alone [s], where its water has a velocity of its own.
+        """
+        ratio = self.stiffness * critical / (critical_of_soil or critical) ** 2 + 0.25 * self.mass * critical
         return critical * float(np.sqrt(1 + ratio**2) - ratio)
 
     def _as_core(self) -> tuple[float, float, float]:
