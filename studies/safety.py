@@ -95,11 +95,12 @@ def parse(arguments: list[str] | None = None) -> Namespace:
 # --- 2. Strength reduction on each mesh ------------------------------------------------------------------------------
 
 
-def target(factor: float) -> Target:
-    """The factor of safety; `factor` is that of limit analysis."""
+def target(factor: float, coefficient: float) -> Target:
+    """The factor of safety; `factor` is that of limit analysis under a seismic coefficient."""
+    under = f", $k_h$ = {coefficient:g}" if coefficient else ""
     return Target(
         "factor_of_safety", "failed_at_factor", "limit_analysis_factor_of_safety", factor,
-        title="Factor of safety {:.3f}", line="{:.3f}", label="Factor of safety [-]",
+        title="Factor of safety {:.3f}" + under, line="{:.3f}", label="Factor of safety [-]",
     )  # fmt: skip
 
 
@@ -249,7 +250,7 @@ def main(arguments: list[str] | None = None) -> int:
     limit = bridge.log_spiral_safety(*soil, depth=a.depth, seismic=a.seismic_coefficient)
     sizes = mesh_sizes(a)
     runs = {angle: [safety(a, size, angle) for size in sizes] for angle in dilation_angles(a)}
-    found = CollapseRuns(target(limit), a.friction_angle, sizes, runs)
+    found = CollapseRuns(target(limit, a.seismic_coefficient), a.friction_angle, sizes, runs)
 
     curve = found.finest_curve()
     summary = {
