@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from .boundary_warnings import doubts_of_boundaries
+from .drainage_warnings import undrained_border
 from .input_warnings import UNIT_WEIGHTS
 from .law_warnings import doubts_of_laws
 from .water_checks import undrained_friction
@@ -30,7 +31,7 @@ def warn_of_setup(model: Model, nmd: bool, damping: float = 0.0, until: float = 
     """
     of_loads = _nothing_acts(model), _nothing_holds(model), _upwards(model), _weight(model) or _softness(model)
     of_laws, of_boundaries = doubts_of_laws(model, nmd), doubts_of_boundaries(model, damping)
-    of_water = _tilted_water(model), undrained_friction(model, until)
+    of_water = _tilted_water(model), undrained_friction(model, until), undrained_border(model)
     found = [text for text in (*of_loads, *of_laws, *of_boundaries, *of_water) if text]
     if model.comm.rank == 0:
         for text in found:
