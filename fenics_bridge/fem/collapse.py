@@ -127,7 +127,6 @@ def factor_of_safety(
     Raises:
         InputError: the load is not carried at the start. Raised on all ranks alike.
     """
-    warn_of_locking_at_failure(model)
     law = model.law
     model.law = reduce(law, start, unreduced)
 
@@ -135,6 +134,7 @@ def factor_of_safety(
         return model.equilibrate(load, law=reduce(law, factor, unreduced))
 
     try:
+        warn_of_locking_at_failure(model)  # of the reduced laws, whose flow may be associated
         steps = model.solve(load, progress=progress)
         agree(model.domain.comm, None if model.converged else _not_carried(start, steps))
         found = _follow(model, weaken, start, first_step, tolerance, progress)

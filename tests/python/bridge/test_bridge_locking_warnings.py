@@ -55,6 +55,20 @@ def test_a_soil_that_keeps_its_volume_as_it_fails_is_named_before_its_collapse()
         assert said(sand(dilation_angle), to_collapse=True, **options) == []
 
 
+@pytest.mark.parametrize("reduce, words", [(bridge.reduced_strength, 1), (bridge.davis_reduced_strength, 0)])
+def test_a_factor_with_associated_flow_does_not_lock(reduce, words):
+    # Davis's strength dilates by its own friction angle, whatever the dilation angle of the soil.
+    domain, cells, facets = bridge.slope_mesh(
+        MPI.COMM_SELF, height=1.0, angle=45.0, crest=1.0, cell_size=0.5, kind="fitted"
+    )
+    body, _, facets = bridge.soil_mesh(domain, cells, facets, tag=bridge.SOIL)
+    fem = bridge.QuasiStatic(body, sand(0.0), facets, SUPPORTS, degree=1)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        bridge.factor_of_safety(fem, bridge.Load(unit_weight=20e3), tolerance=0.3, reduce=reduce)
+    assert sum("dilation angle" in str(each.message) for each in caught) == words
+
+
 @pytest.mark.parametrize("cell, options, few", [(1.0, {"degree": 1, "nmd": True}, True), (0.5, {"degree": 1, "nmd": True}, False),
                                                 (1.0, {"degree": 2}, False)])  # fmt: skip
 def test_a_mechanism_of_few_cells_with_averages_is_named(cell, options, few):
