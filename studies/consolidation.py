@@ -16,6 +16,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from common.checks import say
 from common.consolidation_particles import ParticleGround, near_line
 from common.consolidation_plots import (
     EXCESS,
@@ -67,7 +68,8 @@ def parser() -> ArgumentParser:
     p.add_argument(
         "--pressures", nargs="+", default=None, metavar="NAME=ROWS",
         help="pressures on boundaries, in addition to those of the site file or replacing them: NAME=PA, or over time "
-        "NAME=DAYS:PA,DAYS:PA,... joined by straight lines, such as footing=0:0,10:20e3,60:20e3,70:40e3",
+        "NAME=DAYS:PA,DAYS:PA,... joined by straight lines, such as footing=0:0,10:20e3,60:20e3,70:40e3; pressures at day 0 "
+        "belong to the equilibrium at the beginning",
     )  # fmt: skip
     add_number(p, "--days", 3000.0, "days", "duration of the run", above=0)
     add_number(p, "--first-step", 0.5, "days", "first step, at the beginning and after each change of a load", above=0)
@@ -259,6 +261,9 @@ def main(arguments: list[str] | None = None) -> int:
     a: Namespace = parser().parse_args(arguments)
     start = perf_counter()
     site = read_consolidation_site(a.site, comm, a.cell_size, pressures_of(a.pressures or []))
+    say("" if site.changes_until(DAY * a.days) else
+        f"nothing changes within {a.days:g} days, so that the ground stays in its first equilibrium, which includes pressures that are numbers: "
+        "a load that consolidates the ground begins at 0, such as 'top = [[0.0, 0.0], [0.01, 30e3]]', rows of [days, Pa]")  # fmt: skip
     folder = open_results(a, comm)
     model = site.at_rest(ELEMENTS[a.elements], a.nmd and a.elements == "P1-P1")
     with ExitStack() as stack:

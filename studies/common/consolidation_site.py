@@ -85,6 +85,15 @@ class ConsolidationSite:
         water_rows = times_of(one for stage in self.stages for one in stage.boundary.values())
         return corners_of(starts | ends | rows | water_rows, apart, always=starts)
 
+    def changes_until(self, end: float) -> bool:
+        """Whether soil, a pressure or what the water does changes after the beginning, at which all is in equilibrium, before `end` [s]."""
+        conditions = [one for stage in self.stages for one in stage.boundary.values()]
+        given = [getattr(one, key, None) for one in conditions for key in ("level", "rate")]
+        tables = [*self.pressures.values(), *(one for one in given if isinstance(one, tuple))]
+        times = [time for table in tables for time, _ in table if time < end] + [end]
+        changed = any(value_at(table, time) != value_at(table, 0.0) for table in tables for time in times if time > 0)
+        return changed or any(0 < stage.start < end for stage in self.stages)
+
     def stage_at(self, time: float) -> GroundStage | None:
         """The stage that begins at a time [s], after the beginning; None where none does."""
         return next((one for one in self.stages[1:] if np.isclose(one.start, time, rtol=1e-9, atol=0.0)), None)

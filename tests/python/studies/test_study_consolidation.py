@@ -3,12 +3,14 @@
 import csv
 import json
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 from consolidation_cases import layer_settled
 from mpi4py import MPI
+from study_main import main
 
 from mpm_core import InputError
 
@@ -43,6 +45,44 @@ def test_a_wrong_site_is_named(old, new, words, tmp_path):
     path.write_text(SITE.replace(old, new).replace('"footing.geo"', f'"{STUDIES.parent}/meshes/footing.geo"'))
     with pytest.raises(InputError, match=words):
         read_consolidation_site(path, MPI.COMM_SELF).at_rest(water.Element.STABILISED)
+
+
+RAMP = "footing = [[0.0, 0.0], [10.0, 20e3]]"
+
+
+@pytest.mark.parametrize(
+    "old, new, days, changes",
+    [
+        (RAMP, RAMP, 3.0, True),
+        (RAMP, "footing = 20e3", 3000.0, False),
+        (RAMP, "footing = [[5.0, 20e3]]", 3000.0, False),  # one row holds before it and after it
+        (RAMP, "footing = [[0.0, 20e3], [10.0, 20e3]]", 3000.0, False),
+        (RAMP, "footing = [[-1.0, 0.0], [0.0, 20e3]]", 3000.0, False),  # over at the beginning
+        (RAMP, "footing = [[50.0, 0.0], [60.0, 20e3]]", 40.0, False),  # begins after the end
+        (RAMP, "footing = [[50.0, 0.0], [60.0, 20e3]]", 55.0, True),
+        (RAMP, "footing = [[0.0, 0.0], [1.0, 20e3], [2.0, 0.0]]", 3.0, True),  # as at the beginning again
+        ("reservoir = 0.5  #", "reservoir = [[0.0, 0.5], [1.0, 1.0]]  #", 3.0, True),
+    ],
+)
+def test_ground_in_which_nothing_changes_is_known(old, new, days, changes, tmp_path):
+    from common.consolidation_site import read_consolidation_site
+
+    assert SITE.count(old) == 1 and SITE.count(RAMP) == 1
+    still = SITE if old == RAMP else SITE.replace(RAMP, "footing = 0.0")
+    path = tmp_path / "site.toml"
+    path.write_text(still.replace(old, new).replace('"footing.geo"', f'"{STUDIES.parent}/meshes/footing.geo"'))
+    assert read_consolidation_site(path, MPI.COMM_SELF, 2.0).changes_until(86400.0 * days) == changes
+
+
+@pytest.mark.parametrize("pressure, words", [("footing=20e3", 1), ("footing=0:0,1:20e3", 0)])
+def test_ground_in_which_nothing_changes_is_said(pressure, words, tmp_path, without_pictures):
+    options = ["--cell-size", 2, "--days", 1, "--first-step", 1, "--pressures", pressure, "--output", tmp_path / "out"]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        assert main("consolidation", options) == 0
+    assert sum("nothing changes within 1 days" in str(one.message) for one in caught) == words
+    settled = json.loads((tmp_path / "out" / "summary.json").read_text())["settlement_middle_m"]
+    assert (abs(settled) < 1e-9) == bool(words)
 
 
 def test_particles_take_no_other_water_than_reservoirs(tmp_path):
