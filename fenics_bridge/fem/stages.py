@@ -131,7 +131,8 @@ def carry_out(site: FemSite | ParticleSite, stages: Iterable[Stage]) -> Iterator
         Report of each stage when it is in equilibrium.
 
     Raises:
-        InputError: a stage names a soil or boundary that does not exist. Raised on all ranks alike.
+        InputError: a stage names a soil or boundary that does not exist, or one of a sequence cannot follow those before it; of a
+            sequence before the first stage is computed. Raised on all ranks alike.
         StageError: a stage has no equilibrium.
 
     Example:
@@ -146,8 +147,22 @@ def carry_out(site: FemSite | ParticleSite, stages: Iterable[Stage]) -> Iterator
         raise InputError(
             f"site is a {type(site).__name__} and stages a {type(stages).__name__}, expected a FemSite or ParticleSite and a list"
         )
+    if isinstance(stages, Sequence):
+        require_stages(site, stages)
     for stage in stages:
         yield site.carry_out(stage)
+
+
+def require_stages(site: FemSite | ParticleSite, stages: Sequence[Stage]) -> None:
+    """Go through stages without computing them. Collective.
+
+    Raises:
+        InputError: of the first stage that names what does not exist, or that those before it do not allow, as one that removes
+            soil that is not there. Raised on all ranks alike.
+    """
+    state = site.state
+    for stage in stages:
+        state, _, _ = state.after(stage)
 
 
 class SiteState:
@@ -204,9 +219,10 @@ class SiteState:
         fill, excavate = (self._numbers(where + name, getattr(stage, name)) for name in ("fill", "excavate"))
         there = set(self.there)
         wrong = None
-        wrong = next((f"{where}fill: {stage.fill!r} is there already" for tag in fill if tag in there), wrong)
+        name = self._name_of
+        wrong = next((f"{where}fill: the soil {name(tag)} is there already" for tag in fill if tag in there), wrong)
         wrong = next(
-            (f"{where}excavate: {stage.excavate!r} is not there" for tag in excavate if tag not in there), wrong
+            (f"{where}excavate: the soil {name(tag)} is not there" for tag in excavate if tag not in there), wrong
         )
         agree(self._comm, wrong)
         new.there = tuple(sorted(there.difference(excavate).union(fill)))

@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 import fenics_bridge as bridge
+from fenics_bridge.fem.stages import require_stages
 
 from .site_file import Site
 from .site_options import add_site_file
@@ -30,8 +31,12 @@ def carry_out(
 
     Args:
         options: of `Site.finite_elements`.
+
+    Raises:
+        InputError: before the first stage, for one that cannot follow those before it.
     """
     staged, rows, pictures, stopped = bridge.FemSite(site.finite_elements(degree, **options)), [], [], None
+    require_stages(staged, site.stages)
     with StageFiles(staged, folder / "stages", comm) as files:
         for stage in site.stages:
             try:

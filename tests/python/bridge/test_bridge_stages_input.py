@@ -43,6 +43,27 @@ def test_a_stage_that_asks_for_what_is_not_there_changes_nothing(pit, wrong, mes
     carried_out(site, DIG[0])  # and the site can go on
 
 
+@pytest.mark.parametrize(
+    "second, message",
+    [
+        (bridge.Stage("b", excavate="pit 1"), "stage 'b': excavate: the soil 'pit 1' is not there"),
+        (bridge.Stage("b", excavate=["ground", "pit 1"]), "stage 'b': excavate: the soil 'pit 1' is not there"),
+        (bridge.Stage("b", fill="ground"), "stage 'b': fill: the soil 'ground' is there already"),
+        (bridge.Stage("b", release="wall"), "stage 'b': release: no facet has the name 'wall'"),
+    ],
+)
+def test_a_stage_that_cannot_follow_is_named_before_the_first_is_computed(pit, second, message):
+    site = site_of(pit, elastic(SOILS["pit"]))
+    carried_out(site, IN_SITU)
+    before, load = site.fem.points.stress.copy(), site.fem.load
+    with pytest.raises(bridge.InputError, match=message):
+        carried_out(site, DIG[0], second)
+    assert np.array_equal(site.fem.points.stress, before) and site.fem.load == load
+    with pytest.raises(bridge.InputError, match=message):  # one after the other, as they come
+        list(bridge.carry_out(site, iter([DIG[0], second])))
+    assert not np.array_equal(site.fem.points.stress, before)
+
+
 def test_soil_without_unit_weight_is_named(pit):
     with pytest.raises(bridge.InputError, match="unit_weight: the soil 'ground' has none"):
         carried_out(site_of(pit, elastic(SOILS["pit"])), bridge.Stage("in situ", fill="ground"))
