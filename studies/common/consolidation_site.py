@@ -29,6 +29,7 @@ from mpi4py import MPI
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import water
+from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.mesh.names import known_tags
 from fenics_bridge.water.boundary import value_at
 
@@ -239,6 +240,12 @@ def read_consolidation_site(
     stages = stages_of(rows, list(soils), boundary_of(table, path), f"{path}: stages")
     given = {name: pressure_table(one, f"{path}: pressures.{name}") for name, one in table.get("pressures", {}).items()}
     points = {name: _point(given, f"{path}: points.{name}") for name, given in table["points"].items()}
+    search = PointSearch(mesh[0], np.array(list(points.values())).reshape(-1, 2))
+    for name, found in zip(points, search.found):
+        if not found:
+            raise mpm.InputError(
+                f"{path}: points.{name} is {points[name].tolist()}, expected a place in the mesh of soils [m]"
+            )
     return ConsolidationSite(site, mesh, soils, given | (pressures or {}), points, stages)
 
 

@@ -33,6 +33,11 @@ SITE = (STUDIES.parent / "meshes" / "fill.toml").read_text()
         ("footing = [[0.0, 0.0]", "nowhere = [[0.0, 0.0]", "no facet has the name 'nowhere'"),
         ("middle = [0.0, 0.0]", "middle = [0.0]", r"points.middle is .*expected \[x, y\]"),
         ("[points]", "[places]", "unknown key 'places'"),
+        (
+            "edge = [2.0, 0.0]",
+            "edge = [2.0, 1.0]",
+            r"site.toml: points.edge is \[2.0, 1.0\], expected a place in the mesh",
+        ),
     ],
 )
 def test_a_wrong_site_is_named(old, new, words, tmp_path):
