@@ -41,7 +41,7 @@ from common.results import open_results
 from common.schemes import add_particles_per_cell
 from common.site_options import add_site_file
 from common.summary import write_summary
-from common.water_site import DAY, in_days
+from common.water_site import DAY, time_in_words
 from dolfinx import fem
 from mpi4py import MPI
 
@@ -154,7 +154,7 @@ class Files(FieldFiles):
     def _picture(self) -> ExcessPicture | None:
         """Excess pressures and displacements now; None but on the first rank. Collective."""
         excess, moved = self._that_is_there(gathered(self._excess)), gathered(self._model.displacement)
-        name = f"After {in_days(self._model.time)}"
+        name = f"After {time_in_words(self._model.time)}"
         return None if excess is None or moved is None else ExcessPicture(name, excess, moved.values)
 
     def _that_is_there(self, field: Field | None) -> Field | None:

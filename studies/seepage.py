@@ -24,7 +24,7 @@ from common.results import open_results
 from common.seepage_plots import SATURATION, FlowPicture, dries, few, flow_picture, save_flow, save_flow_film
 from common.site_options import add_site_file
 from common.summary import write_summary
-from common.water_site import DAY, WaterSite, in_days, read_water_site
+from common.water_site import DAY, WaterSite, read_water_site, time_in_words
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -94,7 +94,7 @@ def follow(
         def made() -> None:
             files.row()
             if a.film and flow.time >= end * len(film) / FILM_FRAMES:
-                film.append(flow_picture(flow, f"After {in_days(flow.time)}"))
+                film.append(flow_picture(flow, f"After {time_in_words(flow.time)}"))
             progress.show(flow.time / DAY, len(files.history))
 
         for frame in np.linspace(0.0, end, a.frames + 1)[1:]:
@@ -102,7 +102,7 @@ def follow(
             if stopped:
                 return stopped
             files.frame()
-            pictures.append(flow_picture(flow, f"After {in_days(flow.time)}"))
+            pictures.append(flow_picture(flow, f"After {time_in_words(flow.time)}"))
     return None
 
 

@@ -76,9 +76,11 @@ def corners_of(times: Iterable[float], apart: float = 0.0, always: Container[flo
     return kept[1:]
 
 
-def in_days(time: float) -> str:
-    """A time [s] in words: "1 day", "2.5 days", "1200 days"."""
+def time_in_words(time: float) -> str:
+    """A time [s] in words: "1 day", "2.5 days", "1200 days"; below 0.01 days "7.2 min" or "4.9 s"."""
     days = time / DAY
+    if 0 < days < 0.01:
+        return f"{time / 60:.3g} min" if time >= 60 else f"{time:.3g} s"
     number = f"{days:.0f}" if days >= 100 else f"{days:.3g}"
     return f"{number} day" if number == "1" else f"{number} days"
 

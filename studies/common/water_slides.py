@@ -28,7 +28,7 @@ from .options import add_choice, add_flag, add_number
 from .scenes import scene_of
 from .site_slides import add_slide_options, averages, slide, slide_pictures
 from .slope_site import SlopeSite
-from .water_site import DAY, by_law, directions_of, in_days, vertical_conductivity
+from .water_site import DAY, by_law, directions_of, time_in_words, vertical_conductivity
 from .water_slopes import Instant, lowest
 
 comm = MPI.COMM_WORLD
@@ -63,7 +63,7 @@ def slide_of(
     try:
         model, handover, act = handed_over(a, slope, instant)
     except mpm.RunError as error:  # the factors of safety remain
-        reason = f"no start of the slide from {in_days(instant.time)} on: {error}"
+        reason = f"no start of the slide from {time_in_words(instant.time)} on: {error}"
         if comm.rank == 0:
             print(f"{reason}; another --slide-from or --cell-size may have one", file=sys.stderr)
         return {"slide_stopped_because": reason}, [], {}, 1
@@ -77,7 +77,7 @@ def slide_of(
         result, stopped = slide(a, model, folder, interrupt, act, step)
     moved = result.history["largest_displacement_m"][-1]
     if comm.rank == 0:
-        print(f"slide from {in_days(instant.time)} on: largest displacement {metres(moved)} after "
+        print(f"slide from {time_in_words(instant.time)} on: largest displacement {metres(moved)} after "
               f"{result.history['time_s'][-1]:.3g} s")  # fmt: skip
         if stopped:
             print(f"the slide ended early: {stopped}", file=sys.stderr)
@@ -87,7 +87,7 @@ def slide_of(
         "newly_yielded_fraction": handover.yielded_fraction,
         "particles": comm.allreduce(len(model.particles)),
     }  # fmt: skip
-    movies = [particle_movie(f"slide after {in_days(instant.time)}", scene, result.frames)]
+    movies = [particle_movie(f"slide after {time_in_words(instant.time)}", scene, result.frames)]
     code = interrupt.exit_code or (1 if stopped else 0)
     return summary, movies, slide_pictures(a, result, scene, folder), code
 
@@ -123,7 +123,7 @@ def require_one_level(slope: SlopeSite, end: float) -> None:
         levels = {condition.facet_tag: value_at(condition.level, time) for condition in reservoirs}
         if levels and np.ptp(list(levels.values())) > 1e-9 * max(1.0, *map(abs, levels.values())):
             texts = ", ".join(f"{level:g} m at {name!r}" for name, level in levels.items())
-            raise mpm.InputError(f"--slide-water is flows and the reservoirs have different levels, {texts} after {in_days(time)}; "
+            raise mpm.InputError(f"--slide-water is flows and the reservoirs have different levels, {texts} after {time_in_words(time)}; "
                                  "expected one level, or --slide-water still")  # fmt: skip
 
 
@@ -151,7 +151,7 @@ def handed_over(
         if fem.converged:
             break
     else:
-        raise mpm.RunError(f"the particles find no initial equilibrium at {in_days(instant.time)}")
+        raise mpm.RunError(f"the particles find no initial equilibrium at {time_in_words(instant.time)}")
     model = site.particles(a.particles_per_cell, stronger, more=list(site.laws.values()))
     nodal = pressure(model.mesh.points)
 

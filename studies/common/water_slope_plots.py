@@ -11,7 +11,7 @@ from .field_plots import Field, mechanism_field, save_mechanism
 from .figures import Pictures, curve_figure
 from .plots import CURVES
 from .seepage_plots import MOST_PANELS, PRESSURE, SATURATION, dries, save_flow, save_flow_film
-from .water_site import DAY, in_days
+from .water_site import DAY, time_in_words
 from .water_slopes import Instant, lowest
 
 CAPTIONS = {
@@ -32,7 +32,7 @@ def slope_pictures(
         return {}
     shown = [one.picture for one in _chosen(instants, worst) if one.picture is not None]
     moving = [one.picture for one in instants if one.picture is not None]
-    title = f"{in_days(worst.time)}: factor of safety {worst.safety.value:.2f}"
+    title = f"{time_in_words(worst.time)}: factor of safety {worst.safety.value:.2f}"
     saturation = {"saturation": lambda: save_flow(folder / "saturation.png", shown, SATURATION)} if dries(shown) else {}
     return {
         **saturation,

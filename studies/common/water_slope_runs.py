@@ -18,7 +18,7 @@ from .results import open_results
 from .site_slides import CAPTIONS as SLIDE_CAPTIONS
 from .slope_site import SlopeSite, read_slope_site
 from .summary import write_summary
-from .water_site import DAY, in_days
+from .water_site import DAY, time_in_words
 from .water_slides import require_one_level, slide_of
 from .water_slope_plots import CAPTIONS, slope_pictures
 from .water_slopes import failure_time, follow, lowest
@@ -67,8 +67,8 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
     summary["wall_seconds"] = perf_counter() - start
     values = {name: found.value for name, found in limits.items()}
     page = Page(movies=movies, captions=CAPTIONS | SLIDE_CAPTIONS)
-    fails = "stands" if failed is None else f"fails after {in_days(failed)}"
-    lines = [f"the slope {fails}; lowest factor of safety {worst.safety.value:.3f} after {in_days(worst.time)}"]
+    fails = "stands" if failed is None else f"fails after {time_in_words(failed)}"
+    lines = [f"the slope {fails}; lowest factor of safety {worst.safety.value:.3f} after {time_in_words(worst.time)}"]
     lines += [f"{name}: {value:.3f}" for name, value in values.items()]
     drawn = (slope_pictures(folder, instants, values, a.film) | pictures) if a.pictures else {}
     early = write_summary(folder, a, summary, comm, page, drawn, said="\n".join(lines))

@@ -26,7 +26,7 @@ from .progress import Progress
 from .seepage_plots import FlowPicture, flow_picture
 from .site_options import add_site_file
 from .slope_site import SlopeSite
-from .water_site import DAY, in_days
+from .water_site import DAY, time_in_words
 
 comm = MPI.COMM_WORLD
 FIRST_STEP, TOLERANCE = 0.1, 0.005
@@ -121,7 +121,7 @@ def follow(
             stopped = steps.until(time)
             if stopped:
                 break
-            days = in_days(time)
+            days = time_in_words(time)
             pressure = flow.pore_pressure(a.suction, outside=slope.free_water(time))
             picture = flow_picture(flow, f"After {days}" if time else "At the beginning", slope.ground())
             instants.append(Instant(time, safety(a, slope, pressure, days), pressure, picture))

@@ -112,3 +112,11 @@ def test_no_film_writes_none(tmp_path):
     folder = tmp_path / "results"
     assert seepage.main(["--cell-size", "4", "--days", "5", "--frames", "1", "--no-film", "--output", str(folder)]) == 0
     assert (folder / "seepage_in_time.png").exists() and not list(folder.glob("film.*"))
+
+
+def test_times_are_in_units_that_can_be_read():
+    from common.water_site import DAY, time_in_words
+
+    words = {0.0: "0 days", 4.86: "4.86 s", 60.0: "1 min", 432.0: "7.2 min", 0.01 * DAY: "0.01 days", DAY: "1 day",
+             2.5 * DAY: "2.5 days", 1234.4 * DAY: "1234 days"}  # fmt: skip
+    assert {time: time_in_words(time) for time in words} == words
