@@ -219,7 +219,17 @@ def condition(name: str, given: dict, where: str) -> Any:
                 raise mpm.InputError(
                     f"{where}: {key} has day {later:g} after day {day:g}, expected rows of rising days"
                 )
+        _require_rain(where, key, [number for _, number in value])
         return make(name, tuple((DAY * float(day), unit * float(number)) for day, number in value))
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise mpm.InputError(f"{where}: {key} is {value!r}, expected a number or rows [days, value]")
+    _require_rain(where, key, [value])
     return make(name, unit * float(value))
+
+
+def _require_rain(where: str, key: str, values: list[float]) -> None:
+    """Raises InputError, in the units of the file, for rain that would leave the soil."""
+    if key == "rain" and min(values) < 0:
+        raise mpm.InputError(
+            f"{where}: rain is {min(values):g} mm/day, expected 0 or more: rain does not leave the soil"
+        )

@@ -44,7 +44,8 @@ def read(text, folder):
             "level = 0.0",
             "boundaries.downstream: unknown key 'level', expected some of head, reservoir",
         ),
-        ("rain = 0.0", "rain = -1.0", "rate is -1"),
+        ("rain = 0.0", "rain = -1.0", "boundaries.crest: rain is -1 mm/day, expected 0 or more"),
+        ("rain = 0.0", "rain = [[0.0, 1.0], [2.0, -3.0]]", "boundaries.crest: rain is -3 mm/day, expected 0 or more"),
         (
             "[15.0, 3.0]",
             "[5.0, 3.0]",
