@@ -194,7 +194,7 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
     if not isinstance(axisymmetric, bool):
         raise mpm.InputError(f"{path}: axisymmetric is {axisymmetric!r}, expected true or false")
     domain, cell_tags, facet_tags = site_mesh(table, path, comm, cell_size)
-    warn_of_no_soil(table, path, cell_tags)
+    check_soils(table, path, cell_tags)
     soils, laws, weights = table["soils"], {}, {}
     for soil, given in soils.items():
         where = f"{path}: soils.{soil}"
@@ -243,8 +243,18 @@ def part_of_mesh(mesh: tuple[Any, Any, Any], soils: Collection[str]) -> tuple[An
     return mesh if set(bridge.names_of(mesh[1])) == set(soils) else bridge.soil_mesh(*mesh, tag=list(soils))
 
 
-def warn_of_no_soil(table: dict, path: Path, cell_tags: Any) -> None:
-    """Warn of groups of the mesh that are not among the soils of a site: their cells hold no soil."""
+def check_soils(table: dict, path: Path, cell_tags: Any) -> None:
+    """Compare the soils of a site with the groups of its mesh: warns of groups without a soil, whose cells hold none.
+
+    Raises:
+        InputError: a soil that the mesh does not have.
+    """
+    names = list(bridge.names_of(cell_tags))
+    for soil in table["soils"]:
+        if soil not in names:
+            raise mpm.InputError(
+                f"{path}: soils.{soil}: no cell has the name {soil!r}; the mesh has {', '.join(map(repr, names))}"
+            )
     declared = table.get("air", [])
     named = {*table["soils"], *AIR, *([declared] if isinstance(declared, str) else declared)}
     left = [name for name in bridge.names_of(cell_tags) if name not in named]

@@ -30,7 +30,7 @@ import mpm_core as mpm
 from fenics_bridge import water
 
 from .checks import say
-from .site_file import Site, part_of_mesh, site_mesh, warn_of_no_soil
+from .site_file import Site, check_soils, part_of_mesh, site_mesh
 from .site_keys import CONDITIONS, CURVES, DAY, FLOW, UNDRAINED, changes_of, part_of, read_site_table
 
 
@@ -106,7 +106,7 @@ def read_water_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) 
     if changes:
         say(f"{path}: all soils are there at once, and this study leaves out {changes}")
     mesh = site_mesh(table, path, comm, cell_size)
-    warn_of_no_soil(table, path, mesh[1])
+    check_soils(table, path, mesh[1])
     wet = {name: soil for name, soil in soils.items() if soil is not None}
     boundary = boundary_of(table, path)
     return WaterSite(*part_of_mesh(mesh, wet), wet, list(boundary.values()), varies=bool(times_of(boundary.values())))

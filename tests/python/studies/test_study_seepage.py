@@ -37,7 +37,7 @@ def read(text, folder):
         ("[15.0, 3.0]", '["day 15", 3.0]', "boundaries.upstream: reservoir is .*expected a number or rows"),
         ("conductivity = 1e-8", "permeability = 1e-8", "soils.core: unknown key 'permeability'"),
         ("n = 1.4, ", "", "soils.core: .*missing.*'n'"),
-        ("[soils.core]", "[soils.clay]", "no cell has the name 'clay'"),
+        ("[soils.core]", "[soils.clay]", "soils.clay: no cell has the name 'clay'; the mesh has "),
         ("reservoir = 0.0", 'reservoir = "full"', "boundaries.downstream: reservoir is 'full'"),
         (
             "reservoir = 0.0",

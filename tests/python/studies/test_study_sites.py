@@ -60,7 +60,7 @@ def test_a_site_may_be_a_half_section(tmp_path):
         ("cohesion = 9e3", "cohesion = -1.0", "soils.upper: cohesion is '-1.0', expected a number at least 0"),
         ("top = 2.0", "bottom = 2.0", "soils.lower: shear_strength is .* expected {value = , per_metre = , top = }"),
         ('mesh = "block.geo"', "", "has no 'mesh'"),
-        ("[soils.upper]", "[soils.sand]", "no cell has the name 'sand'"),
+        ("[soils.upper]", "[soils.sand]", "soils.sand: no cell has the name 'sand'; the mesh has "),
         ('"tresca"', '"clay"', "soils.lower: material is 'clay', expected one of"),
         ("cell_size = 0.5", "cell_size = 0.5\nsize = 1", "unknown key 'size'"),
         (
