@@ -59,7 +59,7 @@ Law law_of(std::string_view name, bool yields)
                     600,
                     0.8,
                     largest_pressure,
-                    yields ? 0.01 : 0.5,
+                    yields ? 0.01 : 1.0, // q/p is 0.75 at the start
                     1e3};
   std::fprintf(stderr, "unknown law %s\n", name.data());
   std::exit(1);
