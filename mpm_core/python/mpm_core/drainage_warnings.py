@@ -52,8 +52,8 @@ def undrained_border(model: Model) -> str:
     what = "does not drain all of the soil" if drains else "has no effect"
     where = _place(model, facets.corners[closed], size) if size else "the soil fills the mesh"
     return (
-        f"drained_surface=True {what}: {where}, whose border is impervious: there is no free surface, at which water leaves, stands "
-        "or falls as rain; extend the mesh by empty cells above the soil, or prescribe the pressure at facets "
+        f"drained_surface=True {what}: {where}, whose border is impervious: no free surface is there, at which water would leave, "
+        "stand or fall as rain; extend the mesh by empty cells above the soil, or prescribe the pressure at facets "
         "(model.hold_pore_pressure(tag, 0))"
     )
 
