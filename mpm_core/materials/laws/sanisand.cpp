@@ -128,7 +128,9 @@ template <int D>
 double error_of(const Sand& sand, const Point<D>& start, const Point<D>& rate, const Point<D>& end,
                 const Point<D>& rate_there, double step)
 {
-  const Point<D> error = sum(sum(sum(Point<D>{}, 0.8, sum(start, -1, end)), 0.4 * step, rate), 0.4 * step, rate_there);
+  const Point<D> error =
+      by_number([step](double y0, double y1, double r0, double r1) { return 0.8 * (y0 - y1) + 0.4 * step * (r0 + r1); },
+                start, end, rate, rate_there);
   const double stress = std::max(std::abs(error.pressure), norm<D>(error.deviator)) / end.pressure;
   return std::max({stress, norm<D>(error.back), norm<D>(error.fabric) / std::max(sand.law.fabric_limit, 1.0)});
 }
@@ -161,10 +163,8 @@ bool advance(const Sand& sand, Increment<D>& increment, Point<D>& point, Schedul
       stages = schedule.substeps[accepted].stages;
     }
     const double step = part * rest;
-    Point<D> end = chebyshev_step(
-        point, rate, step, stages, rates_at,
-        [](const auto& a, double factor, const auto& b) { return sum<D>(a, factor, b); },
-        [&](Point<D>& stage) { keep_pressure<D>(sand, point, stage); });
+    Point<D> end = chebyshev_step(point, rate, step, stages, rates_at,
+                                  [&](Point<D>& stage) { keep_pressure<D>(sand, point, stage); });
     put_back<D>(sand, end);
     Point<D> rate_there = rates_at(end);
     const double error = error_of<D>(sand, point, rate, end, rate_there, step);

@@ -78,14 +78,6 @@ double norm(const SymTensor<D>& a)
   return std::sqrt(product<D>(a, a));
 }
 
-/// a + factor b
-template <int D>
-Point<D> sum(const Point<D>& a, double factor, const Point<D>& b)
-{
-  return {a.pressure + factor * b.pressure,   sum<D>(a.deviator, factor, b.deviator), sum<D>(a.back, factor, b.back),
-          sum<D>(a.fabric, factor, b.fabric), a.plastic + factor * b.plastic,         a.fraction + factor * b.fraction};
-}
-
 /// An increment of a point
 template <int D>
 struct Increment
