@@ -38,14 +38,14 @@ def cycles(
     strain: float,
     most: int,
 ) -> Iterator[float]:
-    """Load a point to and fro between two stresses; gives the number of cycles after each increment.
+    """Load a point to and fro between two stresses; gives the number of cycles up to the last peak, a quarter at the first one.
 
     Args:
         kind: one of `CYCLIC`.
         increment: strain increment of a size.
         largest: amplitude of the stress [Pa].
         strain: single amplitude of strain [-] with which the test ends.
-        most: cycles after which it ends.
+        most: cycles after which it ends, at the last of their peaks.
 
     Raises:
         RunError: the law failed.
@@ -62,7 +62,7 @@ def cycles(
         else:
             size = float(np.clip(size * PART * largest / max(abs(change), 1e-300), 0.3 * size, 2 * size))
             size = min(max(size, SMALLEST), LARGEST)
-        yield 0.5 * halves
+        yield max(0.0, 0.5 * halves - 0.25)
 
 
 def first_cycle(history: History, reached: np.ndarray) -> float | None:
