@@ -2,8 +2,9 @@
 
 The levee stands on loose saturated sand over stiffer ground, with the water table at the surface of the ground. Finite elements
 give the equilibrium. In the earthquake the motion of a rock outcrop enters through the base, which absorbs outgoing waves; free
-fields are coupled to the sides. The sand has the law SANISAND and does not drain meanwhile. The ground stays in resting cells,
-which move with their nodes as finite elements do. That the sand settles as its water drains afterwards is not computed.
+fields are coupled to the sides. The sand has the law SANISAND. The ground stays in resting cells, which move with their nodes as
+finite elements do. By default the sand does not drain. With --conductivity its water flows during the earthquake and in the time
+--rest after it, in which the ground settles.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from common.animation import save_animation
-from common.checks import check_cells, check_two_cells
+from common.checks import check_cells, check_effect, check_two_cells
 from common.earthquake_plots import save_ground, save_record
 from common.earthquake_site import FIELDS, outcrop_motion
 from common.figures import Pictures
@@ -45,10 +46,10 @@ import mpm_core as mpm
 comm = MPI.COMM_WORLD
 RATIO = Quantity("Excess pore pressure ratio $1 - p'/p'_0$ of the sand", "-", colours="viridis")
 COLUMNS = [
-    "time_s", "crest_settlement_m", "spreading_of_toes_m",
+    "time_s", "crest_settlement_m", "ground_settlement_m", "spreading_of_toes_m",
     "pore_pressure_ratio_free_field", "pore_pressure_ratio_below_toe", "pore_pressure_ratio_below_crest",
 ]  # fmt: skip
-"""The toes move apart; pore pressures are at the middle of the sand"""
+"""The ground settles in the free field; the toes move apart; pore pressures are at the middle of the sand"""
 PLACES = ("free_field", "below_toe", "below_crest")
 
 
@@ -73,6 +74,9 @@ def parser() -> ArgumentParser:
     add_soil_options(p, dilation_angle=0.0)
     p.set_defaults(young=40e6, poisson=0.3, cohesion=10e3, friction_angle=32.0)
     add_number(p, "--stiff-young", 400e6, "Pa", "Young's modulus of the stiffer ground, which stays elastic", above=0)
+    add_number(p, "--conductivity", None, "m/s", "hydraulic conductivity of the sand, whose water flows then (default: none, the sand "
+               "does not drain)", above=0)  # fmt: skip
+    add_number(p, "--stiff-conductivity", 1e-6, "m/s", "hydraulic conductivity of the stiffer ground", above=0)
     add_motion_options(p)
     p.set_defaults(peak=2.0, rest=2.0)
     add_count(p, "--frames", 40, "times at which the ground is drawn")
@@ -88,6 +92,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check_cells(p, a, 2.3 * length * (a.height + a.sand_depth + a.stiff_depth) / a.cell_size**2, "--cell-size", "--beside",
                 "--sand-depth", "--stiff-depth")  # fmt: skip
     check_motion(p, a)
+    check_effect(p, a, a.conductivity is not None, ("--stiff-conductivity",), "--conductivity")
     loose_sand(a)  # names what is wrong with its parameters
     return a
 
@@ -96,7 +101,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
 
 
 class Followed:
-    """Soil that the history follows: crest, toes, and sand in the free field, below a toe and below the crest. Collective."""
+    """Soil that the history follows: crest, surface of the free field, toes, and sand in the free field, below a toe and below the crest. Collective."""
 
     def __init__(self, model: mpm.Model, a: Namespace) -> None:
         left, right = a.beside, a.beside + 2 * a.slope * a.height + a.crest
@@ -107,6 +112,7 @@ class Followed:
 
         self._model = model
         self._crest = near(middle, a.height, "levee")
+        self._ground = near(0.25 * a.beside, 0.0, "sand")
         self._toes = near(left, 0.0, "sand"), near(right, 0.0, "sand")
         self._sand = [near(x, depth, "sand") for x in (0.25 * a.beside, left, middle)]
         self._start = [self._pressure(numbers) for numbers in self._sand]
@@ -120,19 +126,20 @@ class Followed:
         """Values of the columns."""
         left, right = (mean_displacement(self._model, toe)[0] for toe in self._toes)
         ratios = [1 - self._pressure(numbers) / start for numbers, start in zip(self._sand, self._start)]
-        settled = -mean_displacement(self._model, self._crest)[1]
-        return dict(zip(COLUMNS, (time, settled, right - left, *ratios)))
+        crest, ground = (-mean_displacement(self._model, numbers)[1] for numbers in (self._crest, self._ground))
+        return dict(zip(COLUMNS, (time, crest, ground, right - left, *ratios)))
 
 
 def shaken(a: Namespace, model: mpm.Model, until: float, folder: Path) -> tuple[History, list, mpm.Report]:
     """Run to the end; history, frames and the last report."""
     followed, start = Followed(model, a), effective_pressure(model)
     frames, samples = [frame_at(model, start, 0.0)], max(a.frames, round(until / (2 * STEP)))
+    more = ("pore_pressure", "water_velocity") if model.has_water else ("state",)
     run = model.explicit(until, every=until / samples, rayleigh=damping_of(a), nmd=True, conversion=None)
     with (
         History(folder / "history.csv", COLUMNS, comm) as history,
         Progress("levee", until, comm) as progress,
-        ModelOutput(model, folder / "particles", folder / "mesh", (*FIELDS, "state")) as files,
+        ModelOutput(model, folder / "particles", folder / "mesh", (*FIELDS, *more)) as files,
     ):
         files.write()
         history.add(**followed.row(0.0))
@@ -191,8 +198,11 @@ def main(arguments: list[str] | None = None) -> int:
     largest = {
         f"largest_pore_pressure_ratio_{place}": history[f"pore_pressure_ratio_{place}"].max() for place in PLACES
     }
+    shaking = history["time_s"] <= record[2].time[-1] + 1e-9
     summary = {
         "crest_settlement_m": history["crest_settlement_m"][-1],
+        "crest_settlement_at_end_of_motion_m": history["crest_settlement_m"][shaking][-1],
+        "ground_settlement_m": history["ground_settlement_m"][-1],
         "spreading_of_toes_m": history["spreading_of_toes_m"][-1],
         **largest,
         "largest_acceleration_of_outcrop_m_per_s2": np.abs(accelerations(record[2].time, record[2].velocity)[1]).max(),

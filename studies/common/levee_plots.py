@@ -19,6 +19,7 @@ def save_liquefaction(path: Path, history: History) -> None:
     }
     moved = {
         "settlement of the crest": "crest_settlement_m",
+        "of the free field": "ground_settlement_m",
         "spreading of the toes": "spreading_of_toes_m",
     }
     with curve_figure(path, (WIDTH, 4.8), rows=2) as axes:

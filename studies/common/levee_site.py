@@ -29,6 +29,8 @@ AIR_MODULUS = 1.4e5
 """Of the air in the pores of the levee, which is above the water table [Pa]"""
 POROSITY = 0.35
 """Of levee and stiffer layer"""
+MOIST = {"saturation": 0.5, "conductivity": 1e-9}
+"""Of the levee where water flows through the ground: its own stays where it is"""
 
 
 def loose_sand(a: Namespace) -> mpm.Sanisand:
@@ -55,6 +57,33 @@ def laws_at_rest(a: Namespace) -> dict[str, object]:
     }
 
 
+def porosities(a: Namespace) -> dict[str, float]:
+    """By soil."""
+    return {"levee": POROSITY, "sand": a.void_ratio / (1 + a.void_ratio), "stiff": POROSITY}
+
+
+def laws_in_motion(a: Namespace) -> list[object]:
+    """Laws of the particles: those at rest, and that of the sand under cycles. Of undrained soil, unless its water flows."""
+    laws, cyclic, porosity = laws_at_rest(a), loose_sand(a), porosities(a)
+    if a.conductivity is not None:
+        return [*laws.values(), cyclic]
+    modulus = {"levee": AIR_MODULUS, "sand": WATER_MODULUS, "stiff": WATER_MODULUS}
+    undrained = [mpm.Undrained(laws[soil], water_modulus=modulus[soil], porosity=porosity[soil]) for soil in SOILS]
+    return [*undrained, mpm.Undrained(cyclic, water_modulus=WATER_MODULUS, porosity=porosity["sand"])]
+
+
+def add_flowing_water(a: Namespace, model: mpm.Model) -> None:
+    """Fill the pores up to the surface of the ground with water that flows, and those of the levee in part."""
+    model.add_water(
+        porosity=porosities(a),
+        conductivity={"levee": MOIST["conductivity"], "sand": a.conductivity, "stiff": a.stiff_conductivity},
+        saturation={"levee": MOIST["saturation"], "sand": 1.0, "stiff": 1.0},
+        modulus=WATER_MODULUS,
+        suction_limit=0.0,
+    )
+    model.set_pore_pressure(lambda x: WATER * GRAVITY * np.maximum(-x[:, 1], 0.0))
+
+
 def model_in_equilibrium(a: Namespace, motion: mpm.Motion) -> mpm.Model:
     """Levee and ground at rest in cells that rest, on a base that lets the motion in, between free fields."""
     shape = {name: getattr(a, name) for name in ("height", "slope", "crest", "beside", "cell_size")}
@@ -72,15 +101,12 @@ def model_in_equilibrium(a: Namespace, motion: mpm.Motion) -> mpm.Model:
         raise mpm.InputError(
             f"--height is {a.height:g} m, expected a levee that the ground carries; lower it, or raise --cohesion or --friction-angle"
         )
-    sand = loose_sand(a)
-    porosity = {"levee": POROSITY, "sand": a.void_ratio / (1 + a.void_ratio), "stiff": POROSITY}
-    modulus = {"levee": AIR_MODULUS, "sand": WATER_MODULUS, "stiff": WATER_MODULUS}
-    undrained = [mpm.Undrained(laws[soil], water_modulus=modulus[soil], porosity=porosity[soil]) for soil in SOILS]
-    cyclic = mpm.Undrained(sand, water_modulus=WATER_MODULUS, porosity=porosity["sand"])
-    model = mpm.Model(bridge.background_mesh(*mesh), [*undrained, cyclic])
+    model = mpm.Model(bridge.background_mesh(*mesh), laws_in_motion(a))
     for number, soil in enumerate(SOILS):
         model.seed(density=weights[soil] / GRAVITY, per_cell=a.particles_per_cell, cell_tag=soil, material=number)
     model.set_gravity((0.0, -GRAVITY))
+    if a.conductivity is not None:
+        add_flowing_water(a, model)
     bridge.initialise(model, fem, count_displacement=False, resting=True)
     material = model.particles.material
     model.assign(np.where(material == SAND, len(SOILS), material))  # the back stress ratio is that of the stresses
@@ -104,4 +130,5 @@ def damping_of(a: Namespace) -> mpm.Rayleigh:
 
 def effective_pressure(model: mpm.Model) -> np.ndarray:
     """Mean effective stress p' of the rows of this rank [Pa], compression positive."""
-    return -model.particles.stress[:, :3].mean(axis=1) - model.state("excess_pore_pressure")
+    pressure = -model.particles.stress[:, :3].mean(axis=1)
+    return pressure if model.has_water else pressure - model.state("excess_pore_pressure")

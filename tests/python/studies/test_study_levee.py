@@ -46,6 +46,31 @@ def test_dense_sand_carries_the_levee(of):
     assert dense["spreading_of_toes_m"] < 0.5 * loose["spreading_of_toes_m"]
 
 
+def summary_with_water(folder, *options):
+    result = ended("levee", folder, *SMALL, "--void-ratio", "0.88", *options)
+    assert result.returncode == 0, result.stderr
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_water_that_hardly_flows_is_as_that_of_undrained_soil(of, tmp_path):
+    undrained = of(0.88)[0]
+    summary = summary_with_water(tmp_path, "--conductivity", "1e-9", "--stiff-conductivity", "1e-9")
+    for name in ("crest_settlement_m", "spreading_of_toes_m", "largest_pore_pressure_ratio_free_field"):
+        assert summary[name] == pytest.approx(undrained[name], rel=0.1)
+
+
+def test_the_ground_settles_as_its_water_flows_off(of, tmp_path):
+    """Coarse sand: excess pore pressures go within three seconds, and the ground beside, which the levee has pushed up, settles."""
+    undrained = of(0.88)[0]
+    summary = summary_with_water(tmp_path, "--conductivity", "0.03", "--rest", "3")
+    history = np.genfromtxt(tmp_path / "history.csv", delimiter=",", names=True)
+    assert undrained["ground_settlement_m"] < -0.01 and summary["ground_settlement_m"] > -0.005
+    assert summary["largest_pore_pressure_ratio_free_field"] > 0.4
+    assert history["pore_pressure_ratio_free_field"][-1] < 0.1
+    assert summary["crest_settlement_m"] > summary["crest_settlement_at_end_of_motion_m"]
+    assert abs(summary["unexplained_energy_fraction"]) < 0.01
+
+
 def test_the_levee_has_the_strength_of_its_options():
     options = "--cohesion 8e3 --friction-angle 30 --dilation-angle 4 --young 50e6 --poisson 0.25".split()
     law = importlib.import_module("common.levee_site").laws_at_rest(importlib.import_module("levee").parse(options))[
@@ -64,6 +89,8 @@ def test_the_levee_has_the_strength_of_its_options():
     ("options", "message"),
     [
         (["--cell-size", "3"], "--cell-size is 3 m, expected at most half of --height"),
+        (["--stiff-conductivity", "1e-7"], "--stiff-conductivity is given, expected --conductivity with it"),
+        (["--conductivity", "0"], "--conductivity"),
         (["--sanisand", "dilatency=1"], "did you mean dilatancy?"),
         (["--highest-frequency", "0.5"], "--highest-frequency is 0.5 Hz, expected above the lowest frequency"),
     ],
