@@ -135,20 +135,25 @@ def log_spiral_seismic(
     Raises:
         InputError: angles or lengths out of range, or a slope that does not stand without inertia.
     """
-    factor = log_spiral_safety(height, angle, cohesion, friction_angle, unit_weight, depth=depth)
-    if factor < 1:
-        raise InputError(
-            f"unit_weight is {unit_weight!r} N/m3, expected a slope that stands: its factor is {factor:.3f}"
-        )
-    low, high = 0.0, 100.0
-    for _ in range(24):
-        seismic = 0.5 * (low + high)
-        stands = friction_angle >= angle + _tilt(seismic) or (
-            _best(_checked(height, angle, cohesion, friction_angle, depth, seismic)).load * cohesion
-            > unit_weight * height
-        )
-        low, high = (seismic, high) if stands else (low, seismic)
-    return seismic
+    if not 0 < unit_weight < math.inf:
+        raise InputError(f"unit_weight is {unit_weight!r} N/m3, expected a positive number")
+    warn_of_radians(angle=angle, friction_angle=friction_angle)
+
+    def stands(seismic: float) -> bool:
+        if friction_angle >= angle + _tilt(seismic):
+            return True
+        slope = _checked(height, angle, cohesion, friction_angle, depth, seismic)
+        return bool(_best(slope).load * cohesion > unit_weight * height)
+
+    if not stands(0.0):
+        raise InputError(f"unit_weight is {unit_weight!r} N/m3, expected a slope that stands without inertia")
+    low, high = 0.0, 0.5
+    while stands(high):
+        low, high = high, 2 * high
+    for _ in range(18):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stands(middle) else (low, middle)
+    return 0.5 * (low + high)
 
 
 class _Slope(NamedTuple):
