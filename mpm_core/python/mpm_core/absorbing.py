@@ -59,7 +59,8 @@ class AbsorbingSides:
 
         Soil with pore water has the wave speeds and stiffnesses of undrained soil, and no water passes the side unless
         `hold_pore_pressure` prescribes its pressure there. In a free field water flows up and down through the soil, and leaves it
-        at the surface.
+        at the surface, over which the water of `stand_water` stands, given before this call; conditions of `hold_pore_pressure`
+        do not reach the free fields.
 
         Args:
             facet_tag: facets with this tag, or these tags, by number or name, at cells with soil.

@@ -267,8 +267,15 @@ class GroundColumn:
             self.stress[rows], self._state[rows, : law.n_state] = stress, state
 
     def _tractions(self, viscous: Floats) -> Floats:
-        """On the side, means of the layers around each level, (n + 1, D) [Pa]."""
+        """On the side, means of the layers around each level, (n + 1, D) [Pa].
+
+        Without the pressure of standing water, which presses on the model's soil wherever it ends, at its sides too.
+        """
         change = self._change() + viscous
         traction = np.einsum("nij,j->ni", change[:, self._on_side], self._normal) * self._thickness[:, None]
         length = to_levels(self._thickness, self._thickness)
-        return to_levels(traction, traction) / length[:, None]
+        means = to_levels(traction, traction) / length[:, None]
+        if self._water:
+            start, now = (self._water.standing_at(self.heights, time) for time in (self._start, self.time))
+            means += (now - start)[:, None] * self._normal
+        return means

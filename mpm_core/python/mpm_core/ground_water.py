@@ -124,10 +124,14 @@ class GroundWater:
         half = 0.5 * np.column_stack([self.mass, self._thickness])
         self._at_levels, self._around = to_levels(half, half).T
 
-    def _standing(self, time: float) -> float:
-        """Pressure of the water that stands over the surface [Pa]."""
+    def standing_at(self, heights: Floats, time: float) -> Floats:
+        """Hydrostatic pressure below the level of the water that stands over the ground [Pa], (m), at heights [m]."""
         if not self._water.standing:
-            return 0.0
+            return np.zeros(len(heights))
         times, levels = zip(*self._water.standing)
         level = float(np.interp(time, times, levels))
-        return max(0.0, self._water.density * self._gravity * (level - self._surface))
+        return np.maximum(0.0, self._water.density * self._gravity * (level - heights))
+
+    def _standing(self, time: float) -> float:
+        """Pressure of the water that stands over the surface [Pa]."""
+        return float(self.standing_at(np.array([self._surface]), time)[0])

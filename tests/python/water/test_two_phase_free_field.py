@@ -96,12 +96,20 @@ def test_layers_of_older_checkpoints_have_water_that_moves_with_the_soil():
         assert layers_of({**entry, **dry}, None).pores == []
 
 
-def level_site(across, up, excess):
-    """Elastic ground in resting cells, whose pores have an excess of pressure, between free fields."""
+def level_site(across, up, excess, standing=None):
+    """Elastic ground in resting cells, whose pores have an excess of pressure, between free fields; water may stand over it."""
     model = mpm.Model(box((across, up), (2.0, HEIGHT)), ELASTIC)
     model.seed(density=DENSITY, per_cell=3)
     model.set_gravity((0.0, -9.81))
-    model.add_water(porosity=POROSITY, conductivity=CONDUCTIVITY, modulus=MODULUS, suction_limit=0.0)
+    model.add_water(
+        porosity=POROSITY,
+        conductivity=CONDUCTIVITY,
+        modulus=MODULUS,
+        suction_limit=0.0,
+        drained_surface=standing is not None,
+    )
+    if standing is not None:
+        model.stand_water(standing)
     model.set_pore_pressure(lambda x: GAMMA * (HEIGHT - x[:, 1]) + excess)
     buoyant = -9.81 * (DENSITY - WATER) * (HEIGHT - centres(model)[:, 1]) + excess  # so that the weight is carried
     model.particles.set("stress", np.column_stack([buoyant, buoyant, buoyant, 0 * buoyant]))
@@ -115,13 +123,6 @@ def centres(model):
     return np.asarray(model.mesh.points)[model.mesh.cells[model.particles.cell]].mean(axis=1)
 
 
-def settlement(model):
-    """Of the surface at its nodes, by their places along it."""
-    surface = model.mesh.points[:, 1] > HEIGHT - 1e-9
-    order = np.argsort(model.mesh.points[surface, 0])
-    return -model.nodal("displacement")[surface, 1][order]
-
-
 @pytest.mark.parametrize("nmd", [False, True])
 def test_a_level_site_settles_alike_at_its_sides_and_in_its_middle(nmd):
     model = level_site(12, 12, EXCESS)
@@ -133,6 +134,18 @@ def test_a_level_site_settles_alike_at_its_sides_and_in_its_middle(nmd):
     side = centres(model)[:, 0] < 0.2
     assert left[middle].mean() == pytest.approx(consolidated(factor), abs=0.02)
     assert left[side].mean() == pytest.approx(left[middle].mean(), abs=0.01)
+
+
+def test_water_that_rises_over_a_level_site_moves_it_as_little_at_its_sides_as_in_its_middle():
+    """It presses on the sides as on the surface, and by the stresses of the free fields: one of the two counts."""
+    rise, metres = 0.1, 1.0
+    model = level_site(8, 8, 0.0, standing=[(0.0, HEIGHT), (rise, HEIGHT + metres)])
+    model.explicit(2 * rise, nmd=True, damping=0.0, rayleigh=mpm.Rayleigh(mass=100.0), conversion=None).last()
+    by_soil = GAMMA * metres * HEIGHT / OEDOMETER  # where the soil carried the water by itself
+    assert abs(model.particles.displacement[:, 0]).max() < 0.02 * by_soil
+    top, x = centres(model)[:, 1] > HEIGHT - 0.1, centres(model)[:, 0]
+    settled = [-model.particles.displacement[top & beside, 1].mean() for beside in (x < 0.2, abs(x - 1) < 0.2)]
+    assert settled[0] == pytest.approx(settled[1], abs=0.02 * by_soil)
 
 
 def test_free_fields_are_at_rest_where_the_pressures_of_the_site_are_hydrostatic():
