@@ -20,6 +20,8 @@ from fenics_bridge.errors import agree
 from fenics_bridge.fem.elastic import ElasticSolution
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.fem.geometry import Geometry, require_same_geometry
+from fenics_bridge.fem.loads import Load
+from fenics_bridge.fem.pseudo_static import forces_per_volume
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.transfer.dried import balance_dried_soil
@@ -39,6 +41,7 @@ SAME_WEIGHT = 0.01
 
 _OF_LOADS = 'Model.traction, load_surface, particles.set("traction", ...) or fix'
 _REMEDIES = {
+    "body force across gravity": "set_gravity, with the inertia of an earthquake as a part along its axis",
     "pore pressure": "pore water (Model.add_water), laws that are Undrained, or as traction the bridge.seepage_forces",
     "the pressure of water that stands on the surface": "Model.stand_water with pore water, else as traction the bridge.boundary_forces",
 }
@@ -282,8 +285,8 @@ def _warn_of_other_weight(model: mpm.Model, fem: Any) -> None:
     """Warn, on the first rank, of particles whose unit weight is none of those that the finite elements carry. Collective."""
     if not isinstance(fem, QuasiStatic):
         return
-    given = fem.load.unit_weight
-    carried = [float(weight) for weight in (given.values() if isinstance(given, dict) else [given])]
+    towards = _direction_of_gravity(model)
+    carried = [float(force @ towards) for force in forces_per_volume(fem.load, model.mesh.dim)]
     p, gravity = model.particles, float(np.linalg.norm(model.gravity))
     own = gravity * p.mass / p.volume
     low = model.comm.allreduce(float(own.min(initial=np.inf)), MPI.MIN)
@@ -297,6 +300,20 @@ def _warn_of_other_weight(model: mpm.Model, fem: Any) -> None:
             RuntimeWarning,
             stacklevel=3,
         )
+
+
+def _direction_of_gravity(model: mpm.Model) -> NDArray[np.float64]:
+    """Unit vector (D,), down where there is no gravity."""
+    length = float(np.linalg.norm(model.gravity))
+    return np.asarray(model.gravity) / length if length > 0 else -np.eye(model.mesh.dim)[-1]
+
+
+def _acts_across_gravity(model: mpm.Model, load: Load) -> bool:
+    """Whether weight and body force of a load together act along another direction than gravity does."""
+    towards = _direction_of_gravity(model)
+    forces = np.array(forces_per_volume(load, model.mesh.dim))
+    across = np.linalg.norm(forces - np.outer(forces @ towards, towards), axis=1)
+    return bool(load.body_force) and bool((across > SAME_WEIGHT * np.linalg.norm(forces, axis=1).max()).any())
 
 
 def _warn_of_other_water(model: mpm.Model, fem: Any) -> None:
@@ -315,13 +332,13 @@ def _warn_of_other_water(model: mpm.Model, fem: Any) -> None:
 
 def _warn_of_missing_loads(model: mpm.Model, fem: Any) -> None:
     """Warn, on the first rank, of loads of the finite elements where particles carry no forces. Collective."""
-    if not isinstance(fem, QuasiStatic):
+    if isinstance(fem, ElasticSolution):
         return
-    load, comm = fem.load, model.comm
-    missing = [
-        name for name in ("pressure", "traction") if any(np.any(value) for value in getattr(load, name).values())
-    ]
-    if fem.largest_pore_pressure() > 0:
+    load, comm = fem.load if isinstance(fem, QuasiStatic) else fem.load_at(fem.time), model.comm
+    missing = ["body force across gravity"] if _acts_across_gravity(model, load) else []
+    names = ("pressure", "traction") if isinstance(fem, QuasiStatic) else ()
+    missing += [name for name in names if any(np.any(value) for value in getattr(load, name).values())]
+    if isinstance(fem, QuasiStatic) and fem.largest_pore_pressure() > 0:
         if not takes_pore_pressure(model, fem):
             missing.append("pore pressure")
         elif stands_on_surface(fem) and not (model._core.water is not None and model._core.water.standing):

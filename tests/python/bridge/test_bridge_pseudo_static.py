@@ -78,6 +78,75 @@ def test_coefficients_that_are_none(coefficients):
         bridge.pseudo_static(bridge.Load(20e3), coefficients)
 
 
+@pytest.mark.parametrize(
+    ("load", "message"),
+    [
+        (20e3, "load is 20000.0, expected a Load"),
+        (bridge.Load("20e3"), "unit_weight is '20e3', expected real numbers"),
+        (bridge.Load([20e3, 18e3]), "unit_weight is \\[20000.0, 18000.0\\], expected a number"),
+        (
+            bridge.Load(20e3, body_force=(1.0, 0.0)),
+            "body_force is \\(1.0, 0.0\\), expected a dictionary by cell tag or name",
+        ),
+        (bridge.Load(20e3, body_force={None: (1.0, 0.0, 0.0)}), "body_force is .*, expected 2 finite numbers"),
+    ],
+)
+def test_loads_that_inertia_cannot_be_added_to(load, message):
+    with pytest.raises(bridge.InputError, match=message):
+        bridge.pseudo_static(load, (0.2, 0.0))
+
+
+# --- hand-over to particles ---
+
+
+def particles_of(body, gravity):
+    """Particles of 20 kN/m3 under 9.81 m/s2 in the cells of a body on a fixed base."""
+    model = mpm.Model(bridge.background_mesh(*body), mpm.LinearElastic(young=YOUNG, poisson=POISSON))
+    model.seed(density=20e3 / 9.81, per_cell=3)
+    model.fix(BASE)
+    model.set_gravity(gravity)
+    return model
+
+
+def shaken_body(coefficients):
+    body = bridge.box_mesh(MPI.COMM_SELF, (1.0, 1.0), (4, 4))
+    fem = bridge.QuasiStatic(body[0], mpm.LinearElastic(young=YOUNG, poisson=POISSON), body[2], [bridge.fixed(BASE)], 1)
+    fem.solve(bridge.pseudo_static(bridge.Load(20e3), coefficients))
+    return body, fem
+
+
+def test_particles_under_tilted_gravity_are_in_the_equilibrium_of_inertia_without_a_warning(recwarn):
+    body, fem = shaken_body((0.2, 0.0))
+    found = bridge.initialise(particles_of(body, (0.2 * 9.81, -9.81)), fem)
+    assert found.unbalanced_ratio < 1e-9
+    assert not [one for one in recwarn if "finite elements" in str(one.message)]
+
+
+def test_particles_without_the_inertia_of_the_finite_elements_are_warned_of():
+    body, fem = shaken_body((0.2, 0.0))
+    with pytest.warns(RuntimeWarning, match="finite elements carry body force across gravity.*by set_gravity"):
+        bridge.initialise(particles_of(body, (0.0, -9.81)), fem, equilibrate=False)
+    body, fem = shaken_body((0.0, 0.1))
+    with pytest.warns(RuntimeWarning, match="unit weight of particles is 20000 N/m3.*18000 N/m3"):
+        bridge.initialise(particles_of(body, (0.0, -9.81)), fem, equilibrate=False)
+
+
+def test_particles_without_the_body_force_of_a_consolidation_are_warned_of():
+    body = bridge.box_mesh(MPI.COMM_SELF, (1.0, 1.0), (4, 4))
+    law = mpm.LinearElastic(young=YOUNG, poisson=POISSON)
+    load = bridge.pseudo_static(bridge.Load(20e3), (0.2, 0.0))
+    fem = bridge.water.Consolidation(
+        body[0], law, bridge.water.PorousSoil(1e-4, porosity=0.4), body[2], [bridge.fixed(BASE)], [bridge.water.Head(4, 1.0)],
+        load=load,
+    )  # fmt: skip
+    fem.initialise(pore_pressure=lambda x: 9810.0 * (1.0 - x[:, 1]))
+    fem.advance(1.0)
+    model = particles_of(body, (0.0, -9.81))
+    model.add_water(porosity=0.4, conductivity=1e-4)
+    with pytest.warns(RuntimeWarning, match="finite elements carry body force across gravity"):
+        bridge.initialise(model, fem, equilibrate=False)
+
+
 # --- slopes -----------------------------------------------------------------------------------------------------------
 
 
