@@ -11,6 +11,7 @@ from mpm_core.input_warnings import warn_of_radians
 from numpy.typing import NDArray
 
 from fenics_bridge.errors import InputError
+from mpm_core import checks
 
 _Array = NDArray[np.float64]
 
@@ -62,12 +63,15 @@ def log_spiral(
         depth: of the ground of the same soil below the toe [m], into which spirals may reach: they end before the toe, at the
             toe, or on the slope. None: they end at the toe, however deep they dip below its level before; `curve` of the
             result shows it.
-        seismic: horizontal seismic coefficient, the inertia force out of the slope over the weight [-], from 0 on.
+        seismic: horizontal seismic coefficient, the inertia force out of the slope over the weight [-], from 0 on. Above
+            tan(friction_angle) ground of any strength slides on a level that is deep enough, so that `depth` is needed.
 
     Raises:
         InputError: angles or lengths out of range, or a slope so little steeper than the friction angle that it always stands.
     """
     slope = _checked(height, angle, cohesion, friction_angle, depth, seismic)
+    if _slides_on_a_level(friction_angle, depth, seismic):
+        raise InputError(_without_depth(f"seismic={seismic:g} above tan(friction_angle={friction_angle!r})"))
     warn_of_radians(angle=angle, friction_angle=friction_angle)
     best = _best(slope)
     if not np.isfinite(best.load):
@@ -98,20 +102,24 @@ def log_spiral_safety(
         cohesion: cohesion of the soil [Pa].
         friction_angle: friction angle of the soil [degrees].
         unit_weight: unit weight of the soil [N/m3].
-        depth, seismic: see `log_spiral`.
+        depth, seismic: see `log_spiral`. Without `depth` the factor is at most tan(friction_angle) / seismic.
 
     Raises:
         InputError: angles or lengths out of range.
     """
     if not 0 < unit_weight < math.inf:
         raise InputError(f"unit_weight is {unit_weight!r} N/m3, expected a positive number")
+    _require_seismic(seismic)
+    if friction_angle == 0 and _slides_on_a_level(friction_angle, depth, seismic):
+        raise InputError(_without_depth(f"seismic={seismic:g} without friction"))
     warn_of_radians(angle=angle, friction_angle=friction_angle)
     low, high = 1e-2, 1e2
     for _ in range(24):
         factor = math.sqrt(low * high)
         reduced = math.degrees(math.atan(math.tan(math.radians(friction_angle)) / factor))
-        stands = reduced >= angle + _tilt(seismic) or (
-            _best(_checked(height, angle, cohesion, reduced, depth, seismic)).load * cohesion / factor
+        stands = not _slides_on_a_level(reduced, depth, seismic) and (
+            reduced >= angle + _tilt(seismic)
+            or _best(_checked(height, angle, cohesion, reduced, depth, seismic)).load * cohesion / factor
             > unit_weight * height
         )
         low, high = (factor, high) if stands else (low, factor)
@@ -130,16 +138,21 @@ def log_spiral_seismic(
     """Critical seismic coefficient of a slope: the horizontal inertia force over the weight at which `log_spiral` fails [-].
 
     Args:
-        height, angle, cohesion, friction_angle, unit_weight, depth: see `log_spiral_safety`.
+        height, angle, cohesion, friction_angle, unit_weight, depth: see `log_spiral_safety`. Without `depth` the coefficient is
+            at most tan(friction_angle).
 
     Raises:
-        InputError: angles or lengths out of range, or a slope that does not stand without inertia.
+        InputError: angles or lengths out of range, a slope that does not stand without inertia, or soil without friction and depth.
     """
     if not 0 < unit_weight < math.inf:
         raise InputError(f"unit_weight is {unit_weight!r} N/m3, expected a positive number")
+    if friction_angle == 0 and depth is None:
+        raise InputError(_without_depth("friction_angle=0"))
     warn_of_radians(angle=angle, friction_angle=friction_angle)
 
     def stands(seismic: float) -> bool:
+        if _slides_on_a_level(friction_angle, depth, seismic):
+            return False
         if friction_angle >= angle + _tilt(seismic):
             return True
         slope = _checked(height, angle, cohesion, friction_angle, depth, seismic)
@@ -182,6 +195,23 @@ class _Mechanisms(NamedTuple):
     """Shape (..., k, 2)"""
 
 
+def _slides_on_a_level(friction_angle: float, depth: float | None, seismic: float) -> bool:
+    """Whether inertia moves ground without end: its part beyond friction grows with the depth of a level, cohesion does not."""
+    return depth is None and seismic > math.tan(math.radians(friction_angle))
+
+
+def _without_depth(given: str) -> str:
+    return (
+        f"depth is None with {given}, expected the depth of the ground below the toe [m]: inertia moves ground that is deep enough, "
+        "however strong it is"
+    )
+
+
+def _require_seismic(seismic: Any) -> None:
+    if checks.real_numbers("seismic", seismic).ndim or not 0 <= seismic < math.inf:
+        raise InputError(f"seismic is {seismic!r}, expected a number of at least 0")
+
+
 def _tilt(seismic: float) -> float:
     """Angle by which horizontal inertia tilts the weight [degrees]."""
     return math.degrees(math.atan(seismic))
@@ -190,8 +220,7 @@ def _tilt(seismic: float) -> float:
 def _checked(
     height: float, angle: float, cohesion: float, friction_angle: float, depth: float | None, seismic: float
 ) -> _Slope:
-    if not 0 <= seismic < math.inf:
-        raise InputError(f"seismic is {seismic!r}, expected a number of at least 0")
+    _require_seismic(seismic)
     if not (0 <= friction_angle < angle + _tilt(seismic) and 0 < angle <= 90):
         less = " < angle" if seismic == 0 else f" < angle + atan({seismic:g})"
         raise InputError(

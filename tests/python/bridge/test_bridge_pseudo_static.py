@@ -203,3 +203,39 @@ def test_slopes_that_limit_analysis_has_no_coefficient_for():
         bridge.log_spiral_safety(*SLOPE, seismic=-0.1)
     with pytest.raises(bridge.InputError, match="friction_angle < angle \\+ atan\\(0.1\\)"):
         bridge.log_spiral(1.0, 20.0, 1e3, 30.0, seismic=0.1)
+
+
+def test_inertia_beyond_friction_needs_the_depth_of_the_ground():
+    """Level ground of height h slides on its base at (k - tan(phi)) gamma h = c, at nothing where h may be as large as it likes."""
+    with pytest.raises(
+        bridge.InputError, match="depth is None with seismic=0.1 above tan.friction_angle=0.0., expected the depth"
+    ):
+        bridge.log_spiral(1.0, 45.0, 1e3, 0.0, seismic=0.1)
+    with pytest.raises(bridge.InputError, match="depth is None with seismic=0.1 without friction, expected the depth"):
+        bridge.log_spiral_safety(1.0, 45.0, 10e3, 0.0, 20e3, seismic=0.1)
+    with pytest.raises(bridge.InputError, match="depth is None with friction_angle=0, expected the depth"):
+        bridge.log_spiral_seismic(1.0, 45.0, 10e3, 0.0, 20e3)
+    strong = 1.0, 45.0, 100e3, 20.0, 20e3
+    tangent = np.tan(np.radians(20.0))
+    assert bridge.log_spiral_seismic(*strong) == pytest.approx(tangent, rel=1e-4)
+    assert bridge.log_spiral_safety(*strong, seismic=0.3) == pytest.approx(tangent / 0.3, rel=1e-4)
+    assert bridge.log_spiral_seismic(*strong, depth=0.0) > 2 * tangent
+
+
+@pytest.mark.parametrize("friction_angle", [0.0, 20.0])
+@pytest.mark.parametrize("seismic", [0.1, 0.5])
+def test_spirals_are_no_stronger_than_the_best_plane_through_the_toe_of_a_cut(friction_angle, seismic):
+    """The weight W above a plane at theta drives by W (sin(theta - phi) + k cos(theta - phi)), cohesion holds by c L cos(phi)."""
+    theta, phi = np.radians(np.linspace(1.0, 89.0, 2000)), np.radians(friction_angle)
+    driving = 0.5 / np.tan(theta) * (np.sin(theta - phi) + seismic * np.cos(theta - phi))
+    planes = np.where(driving > 0, np.cos(phi) / np.sin(theta) / np.where(driving > 0, driving, 1.0), np.inf)
+    spiral = bridge.log_spiral(1.0, 90.0, 1.0, friction_angle, seismic=seismic, depth=0.0).unit_weight
+    assert 0.9 * planes.min() < spiral < planes.min()
+
+
+@pytest.mark.parametrize("seismic", ["0.1", None, True, (0.1, 0.2)])
+def test_seismic_coefficients_that_are_no_number(seismic):
+    with pytest.raises(bridge.InputError, match="seismic is"):
+        bridge.log_spiral(*SLOPE[:4], seismic=seismic)
+    with pytest.raises(bridge.InputError, match="seismic is"):
+        bridge.log_spiral_safety(*SLOPE, seismic=seismic)
