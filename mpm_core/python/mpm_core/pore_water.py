@@ -116,6 +116,10 @@ class PoreWater(Conditions):
             require_pores(n, k)
             filled = self._values("saturation", saturation)
             require_saturation(filled, water.suction_limit, retention)
+            if self._core.has_two_phases and (filled < 1).any():
+                raise InputError(
+                    f"saturation is {filled.min()} after explicit(), by which water has a mass of its own; expected it before the first one"
+                )
             self._set_retention(water, curves_of_laws(retention, self.laws))
             water.anisotropy = tensors_of_laws(anisotropy, len(self.laws), self.mesh.dim)
             if any(isinstance(law, _core.Undrained) for law in self.laws):
@@ -180,7 +184,8 @@ class PoreWater(Conditions):
     def set_pore_pressure(self, pressure: float | Callable[[NDArray], ArrayLike]) -> None:
         """Give the particles pore pressures: those at the nodes, and linear in each cell.
 
-        Where soil may dry its saturation and mass follow; where water moves by itself, its mass does, that of full pores.
+        Where soil may dry its saturation and mass follow; where water moves by itself, its mass does, that of full pores. Moist soil
+        (``saturation`` of `add_water`) keeps the pressure of the ``suction_limit`` until explicit runs begin.
 
         Args:
             pressure: [Pa], compression positive: a number, or a function of positions, shape (n, D), that returns shape (n,).
@@ -199,7 +204,12 @@ class PoreWater(Conditions):
         values = collectively(self.comm, at_nodes)[corners]
         x, position = self.mesh.points[corners], self.particles.position
         gradient = np.linalg.solve(x[:, 1:] - x[:, :1], (values[:, 1:] - values[:, :1])[..., None])[..., 0]
-        self.particles.set("pore_pressure", values[:, 0] + np.einsum("pa,pa->p", gradient, position - x[:, 0]))
+        found = values[:, 0] + np.einsum("pa,pa->p", gradient, position - x[:, 0])
+        saturation, water = self.particles.saturation, self._core.water
+        if len(saturation) and not water.may_dry:
+            moist = saturation < 1
+            found[moist], gradient[moist] = -water.suction_limit, 0.0
+        self.particles.set("pore_pressure", found)
         self.particles.set("pressure_gradient", gradient)
         self.saturate()
 
@@ -356,7 +366,11 @@ class PoreWater(Conditions):
         self._require_water()
         p = self.particles
         pores = p.porosity * p.volume
-        return self.comm.allreduce(float(np.sum(pores * p.saturation if self._core.water.may_dry else pores)))
+        if self._core.has_two_phases:
+            filled = np.minimum(pores, p.water_mass / self._core.water.density)
+        else:
+            filled = pores * p.saturation if len(p.saturation) else pores
+        return self.comm.allreduce(float(np.sum(filled)))
 
     def water_inflow(self) -> float:
         """Water that has entered the soil since `add_water` [m3], as `water_volume`; negative where it left. Collective."""

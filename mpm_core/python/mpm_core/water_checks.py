@@ -70,13 +70,13 @@ def require_soil(model: PoreWater) -> None:
     require_pores(p.porosity, p.conductivity)
     if model._core.has_two_phases:
         return
-    of_water = p.porosity * water.density * (p.saturation if water.may_dry else 1.0)
+    of_water = p.porosity * water.density * (p.saturation if len(p.saturation) else 1.0)
     density = p.mass / p.volume
     light = density <= of_water
     if light.any():
         raise InputError(
             f"density of a particle is {density[light][0]:g} kg/m3, expected more than that of the water in its pores, "
-            f"{of_water[light][0]:g} kg/m3 of soil; densities are of the saturated soil"
+            f"{of_water[light][0]:g} kg/m3 of soil; densities are those with the water"
         )
 
 

@@ -175,6 +175,51 @@ def test_moist_soil_has_no_pore_pressure_until_its_pores_have_closed_so_far_that
     assert closed
 
 
+def half_moist(density=DENSITY, porosity=POROSITY, filled=0.25):
+    """A column at rest, whose upper half is moist."""
+    model = mpm.Model(box((2, 4)), ELASTIC)
+    model.seed(density=density, per_cell=3)
+    moist = model.particles.position[:, 1] > 0.5
+    model.add_water(porosity=porosity, conductivity=1e-9, suction_limit=0.0, saturation=np.where(moist, filled, 1.0))
+    return model, moist
+
+
+def test_the_volume_of_water_is_that_of_the_pores_which_it_fills():
+    model, _ = half_moist()
+    for _ in range(2):  # before and after the water has a mass of its own
+        assert model.water_volume() == pytest.approx(POROSITY * (0.5 * 0.25 + 0.5), rel=1e-6)
+        model.explicit(1e-6).last()
+
+
+def test_moist_soil_may_be_lighter_than_its_pores_full_of_water():
+    """As peat is: 700 kg/m3 with pores of 0.85 that hold 0.85 * 0.25 * 1000 = 212.5 kg/m3 of water."""
+    model = mpm.Model(box((2, 4)), ELASTIC)
+    model.seed(density=700.0, per_cell=3)
+    model.add_water(porosity=0.85, conductivity=1e-9, suction_limit=0.0, saturation=0.25)
+    model.explicit(1e-6).last()
+    p = model.particles
+    assert p.water_mass / p.volume == pytest.approx(212.5, rel=1e-6)
+    assert p.mass / p.volume == pytest.approx(700.0 - 212.5, rel=1e-6)
+    model, _ = half_moist(density=700.0, porosity=0.85)
+    with pytest.raises(mpm.InputError, match="density of a particle is 700 kg/m3, expected more than.* 850 kg/m3"):
+        model.explicit(1e-6)
+
+
+def test_moist_soil_keeps_its_pressure_where_pressures_are_given():
+    model, moist = half_moist()
+    model.set_pore_pressure(lambda x: GAMMA * (1.5 - x[:, 1]))
+    p = model.particles
+    assert not p.pore_pressure[moist].any() and not p.pressure_gradient[moist].any()
+    assert p.pore_pressure[~moist] == pytest.approx(GAMMA * (1.5 - p.position[~moist, 1]))
+
+
+def test_soil_whose_water_has_a_mass_does_not_become_moist():
+    model, _ = half_moist(filled=1.0)
+    model.explicit(1e-6).last()
+    with pytest.raises(mpm.InputError, match="saturation is 0.5 after explicit\\(\\), .* expected it before the first"):
+        model.add_water(porosity=POROSITY, conductivity=1e-3, suction_limit=0.0, saturation=0.5)
+
+
 # --- input ------------------------------------------------------------------------------------------------------------
 
 
