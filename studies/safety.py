@@ -193,7 +193,11 @@ def critical_slope(a: Namespace) -> dict[str, object]:
     )
     limit = bridge.log_spiral_seismic(*soil, depth=a.depth)
     if comm.rank == 0:
-        print(f"critical seismic coefficient by limit analysis, associated flow: {limit:.3f}")
+        curve = bridge.log_spiral(*soil[:4], a.crest, depth=a.depth, seismic=limit).curve
+        print(
+            f"critical seismic coefficient by limit analysis, associated flow: {limit:.3f}\n{outside_line(a, curve)}",
+            end="",
+        )
     return found | {"limit_analysis_seismic_coefficient": limit}
 
 

@@ -58,6 +58,14 @@ def test_an_earthquake_as_a_force_that_stays(tmp_path):
     assert again["factor_of_safety"] == pytest.approx(1.0, abs=5e-3)
 
 
+def test_a_critical_coefficient_of_a_mesh_that_is_too_short_says_so(tmp_path):
+    """The deep slip lines of clay begin far behind the crest; a short mesh fails at a larger coefficient than limit analysis."""
+    clay = ["--friction-angle", "0", "--cohesion", "6e3", "--depth", "1", "--cell-size", "0.25", "--meshes", "1"]
+    said = ended("safety", tmp_path, *clay, "--critical-seismic").stdout.splitlines()
+    after = said.index("critical seismic coefficient by limit analysis, associated flow: 0.174") + 1
+    assert "behind the mesh: --crest is too short to compare" in said[after]
+
+
 @pytest.mark.parametrize(("friction_angle", "tolerance"), [(0, 0.02), (20, 0.05)])
 def test_bearing_capacity(tmp_path, friction_angle, tolerance):
     """Prandtl: 2 + pi; 14.83 for 20 degrees."""
