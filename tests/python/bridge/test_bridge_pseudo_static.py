@@ -197,7 +197,9 @@ def test_a_slope_flatter_than_the_friction_angle_fails_by_inertia(angle):
 
 
 def test_slopes_that_limit_analysis_has_no_coefficient_for():
-    with pytest.raises(bridge.InputError, match="unit_weight is 40000.0 N/m3, expected a slope that stands without inertia"):
+    with pytest.raises(
+        bridge.InputError, match="unit_weight is 40000.0 N/m3, expected a slope that stands without inertia"
+    ):
         bridge.log_spiral_seismic(1.0, 45.0, 1e3, 10.0, 40e3)
     with pytest.raises(bridge.InputError, match="seismic is -0.1, expected a number of at least 0"):
         bridge.log_spiral_safety(*SLOPE, seismic=-0.1)
