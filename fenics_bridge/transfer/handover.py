@@ -286,7 +286,7 @@ def _warn_of_other_weight(model: mpm.Model, fem: Any) -> None:
     if not isinstance(fem, QuasiStatic):
         return
     towards = _direction_of_gravity(model)
-    carried = [float(force @ towards) for force in forces_per_volume(fem.load, model.mesh.dim)]
+    carried = [float(force @ towards) for force in forces_per_volume(fem.load, model.mesh.dim)] or [0.0]
     p, gravity = model.particles, float(np.linalg.norm(model.gravity))
     own = gravity * p.mass / p.volume
     low = model.comm.allreduce(float(own.min(initial=np.inf)), MPI.MIN)
@@ -311,9 +311,10 @@ def _direction_of_gravity(model: mpm.Model) -> NDArray[np.float64]:
 def _acts_across_gravity(model: mpm.Model, load: Load) -> bool:
     """Whether weight and body force of a load together act along another direction than gravity does."""
     towards = _direction_of_gravity(model)
-    forces = np.array(forces_per_volume(load, model.mesh.dim))
+    forces = np.array(forces_per_volume(load, model.mesh.dim)).reshape(-1, model.mesh.dim)
+    size = SAME_WEIGHT * np.linalg.norm(forces, axis=1).max(initial=0.0)
     across = np.linalg.norm(forces - np.outer(forces @ towards, towards), axis=1)
-    return bool(load.body_force) and bool((across > SAME_WEIGHT * np.linalg.norm(forces, axis=1).max()).any())
+    return bool(load.body_force) and bool((across > size).any())
 
 
 def _warn_of_other_water(model: mpm.Model, fem: Any) -> None:
@@ -346,7 +347,7 @@ def _warn_of_missing_loads(model: mpm.Model, fem: Any) -> None:
     if comm.allreduce(float(np.abs(model.particles.traction).max(initial=0.0)), MPI.MAX) > 0 or model._contacts:
         missing = []
     held = {condition[0] for condition in model._conditions}
-    for support in fem.supports if load.displacement else ():
+    for support in fem.supports if isinstance(fem, QuasiStatic) and load.displacement else ():
         if any(support.displacement or ()) and held.isdisjoint(
             tag_numbers(fem.domain.comm, fem.facet_tags, support.facet_tag, "supports")
         ):

@@ -147,6 +147,17 @@ def test_particles_without_the_body_force_of_a_consolidation_are_warned_of():
         bridge.initialise(model, fem, equilibrate=False)
 
 
+def test_finite_elements_that_carry_no_weight_are_said_and_not_stumbled_over():
+    body, _ = shaken_body((0.0, 0.0))
+    law = mpm.LinearElastic(young=YOUNG, poisson=POISSON)
+    fem = bridge.QuasiStatic(body[0], law, body[2], [bridge.fixed(BASE)], 1)
+    fem.solve(bridge.Load({}))
+    with pytest.warns(
+        RuntimeWarning, match="unit weight of particles is 20000 N/m3, .* that of the finite elements 0 N/m3"
+    ):
+        bridge.initialise(particles_of(body, (0.0, -9.81)), fem, equilibrate=False)
+
+
 # --- slopes -----------------------------------------------------------------------------------------------------------
 
 
