@@ -60,7 +60,12 @@ def parser() -> ArgumentParser:
         "-",
         "horizontal inertia force over the weight, out of the slope; of a site along the first axis",
     )
-    add_flag(p, "--critical-seismic", "also find the seismic coefficient at which soil of full strength fails")
+    add_flag(
+        p,
+        "--critical-seismic",
+        "also find the seismic coefficient at which soil of full strength fails; of a site "
+        "against the first axis where --seismic-coefficient is below 0",
+    )
     add_number(p, "--start", 0.5, "-", "first factor of safety to try; the slope must be stable with it", above=0)
     add_flow_options(p)
     add_site_option(p)
@@ -117,8 +122,12 @@ def shaken(load: bridge.Load, coefficient: float, dim: int = 2) -> bridge.Load:
     return bridge.pseudo_static(load, [coefficient] + [0.0] * (dim - 1)) if coefficient else load
 
 
-def critical_seismic(model: bridge.QuasiStatic, load: bridge.Load, where: str) -> dict[str, object]:
-    """Raise the inertia on finite elements until they fail; entries of the summary, printed on the first rank. Collective."""
+def critical_seismic(model: bridge.QuasiStatic, load: bridge.Load, where: str, along: int = 1) -> dict[str, object]:
+    """Raise the inertia on finite elements until they fail; entries of the summary, printed on the first rank. Collective.
+
+    Args:
+        along: 1 or -1, along or against the first axis.
+    """
     progress = step_line(where, "seismic coefficient")
     model.solve(load, progress=progress)
     if not model.converged:
@@ -126,7 +135,7 @@ def critical_seismic(model: bridge.QuasiStatic, load: bridge.Load, where: str) -
             "--critical-seismic: the soil does not carry its weight without inertia, expected a factor of safety above 1"
         )
     dim = model.domain.geometry.dim
-    found = bridge.collapse_load(model, lambda k: shaken(load, k, dim), first_step=0.05, progress=progress)
+    found = bridge.collapse_load(model, lambda k: shaken(load, along * k, dim), first_step=0.05, progress=progress)
     if comm.rank == 0:
         end = f"failure at {found.failed_at:.3f}" if found.failed else f"at least: {found.reason}"
         print(f"critical seismic coefficient on the finest mesh: {found.value:.3f}, {end}")
@@ -244,7 +253,7 @@ def main(arguments: list[str] | None = None) -> int:
             found = particle_summary(site_by_particles(a, site)) if a.particles else {}
             if a.critical_seismic:
                 model = site.finite_elements(**finite_elements(a))
-                found |= critical_seismic(model, site_load(site, model), "site")
+                found |= critical_seismic(model, site_load(site, model), "site", -1 if a.seismic_coefficient < 0 else 1)
             return found
 
         return site_study(a, factor, "factor_of_safety", "Factor of safety [-]", more, at_once=a.particles)

@@ -111,7 +111,7 @@ def test_without_friction_more_weight_is_as_less_strength(tmp_path):
 def test_a_site_is_shaken_along_the_first_axis(tmp_path):
     """Its right side is free, so that forces to the right weaken it, which fails at some coefficient, and forces to the left do not."""
     path, factors = site_in(tmp_path), {}
-    for coefficient, more in ((0.0, ["--critical-seismic"]), (0.1, []), (-0.1, [])):
+    for coefficient, more in ((0.0, ["--critical-seismic"]), (0.1, []), (-0.1, ["--critical-seismic"])):
         folder = tmp_path / f"{coefficient}"
         options = ["--site", str(path), "--meshes", "1", "--seismic-coefficient", str(coefficient), *more]
         assert importlib.import_module("safety").main([*options, "--output", str(folder)]) == 0
@@ -120,6 +120,7 @@ def test_a_site_is_shaken_along_the_first_axis(tmp_path):
     assert values[0] < 0.95 * values[1] and values[1] < values[2]
     critical = factors[0.0]["critical_seismic_coefficient"]
     assert (critical > 0.1) == (values[0] > 1) and critical > 0
+    assert factors[-0.1]["critical_seismic_coefficient"] > 1.2 * critical  # to the left
 
 
 STAGES = """
