@@ -124,8 +124,8 @@ def test_a_soil_without_a_law_is_named(tmp_path):
 
 
 def ground_alone(folder, first_line=""):
-    """The site without the bank and the stages."""
-    text = written(folder).read_text()
+    """The site without the bank, its point on it, and the stages."""
+    text = written(folder, ("crest = [5.0, 8.0]  # m\n", "")).read_text()
     bank, ground, stages = (text.index(words) for words in ("[soils.bank]", "[soils.ground]", "[[stages]]"))
     (folder / "site.toml").write_text(f"{first_line}\n{text[:bank]}{text[ground:stages]}")
     return folder / "site.toml"
