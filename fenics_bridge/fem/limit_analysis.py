@@ -325,9 +325,14 @@ def _mechanisms(slope: _Slope, swept: Any, spiral: tuple[_Array, _Array], toe: A
 def _moment(x: _Array, y: _Array) -> Any:
     """Moment of the weight about the pole, over the unit weight; the soil to the left of the pole goes down.
 
-    Taken about the first point at first, as the pole may be so far away that hardly a digit would be left.
+    Where the pole is far away from the soil, compared with its size, hardly a digit would be left: the moment is then taken about
+    the first point at first.
     """
     u, v = x - x[..., :1], y - y[..., :1]
+    size, distance = np.hypot(u, v).max(axis=-1), np.hypot(x[..., 0], y[..., 0])
+    origin = np.where(size < 0.1 * distance, 1.0, 0.0)[..., None]
+    x0, y0 = origin * x[..., :1], origin * y[..., :1]
+    u, v = x - x0, y - y0
     u_next, v_next = np.roll(u, -1, axis=-1), np.roll(v, -1, axis=-1)
     cross = u * v_next - u_next * v
-    return -np.sum((u + u_next) * cross, axis=-1) / 6 - x[..., 0] * np.sum(cross, axis=-1) / 2
+    return -np.sum((u + u_next) * cross, axis=-1) / 6 - x0[..., 0] * np.sum(cross, axis=-1) / 2

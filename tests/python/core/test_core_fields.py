@@ -73,8 +73,8 @@ def test_each_field_of_the_schedule_is_an_attribute_with_its_meaning(dim):
     model.traction(1, [1.0] * dim)
     model.rest(where=lambda x: x[:, 0] > 0.4)
     model.add_water(porosity=0.4, conductivity=1e-6)
-    model.particles.set("saturation", np.ones(len(model.particles)))  # where soil may dry
     model._core.split_phases()  # the water's own mass and velocity, which explicit runs give it
+    model.particles.set("saturation", np.ones(len(model.particles)))  # where soil may dry
     for field in model.particles.schedule():
         values = getattr(model.particles, field["name"])
         assert values.shape in ((len(model.particles),), (len(model.particles), field["components"]))
