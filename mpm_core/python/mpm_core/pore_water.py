@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -21,16 +21,11 @@ from .parameter_fields import Field
 from .particles import Particles
 from .retention import curves_of_laws, joined
 from .water_checks import density_of_water, require_pores, require_saturation, require_soil
-
-History: TypeAlias = list[tuple[float, float]]
-"""Pairs of time [s] and value, of rising times, joined by straight lines; one pair for a value that stays"""
+from .water_tables import History, Value, history_of
 
 WaterCondition: TypeAlias = tuple[int, History, bool, bool, bool]
 """Facet tag; pressure [Pa] or level [m] over time; whether it is a level; whether the pore water has that pressure; whether it
 presses on the soil"""
-
-Value: TypeAlias = float | Sequence[tuple[float, float]]
-"""A number, or a table ((time [s], value), ...) of rising times, before and after which the end values hold"""
 
 
 class WaveSpeeds(NamedTuple):
@@ -394,24 +389,6 @@ class PoreWater(Conditions):
         """Refuse particles without pores, such as those seeded after `add_water`, or too light. Collective."""
         if self._core.water is not None:
             collectively(self.comm, lambda: require_soil(self))
-
-
-def history_of(name: str, value: Value, least: float = -np.inf) -> History:
-    """A number or a table over time as pairs.
-
-    Raises:
-        InputError: numbers that are not finite or below the least, or times that do not rise.
-    """
-    numbers = real_numbers(name, value)
-    pairs = np.array([[0.0, numbers]]) if numbers.ndim == 0 else numbers
-    good = pairs.ndim == 2 and pairs.shape[1:] == (2,) and len(pairs) > 0 and bool(np.isfinite(pairs).all())
-    if not good or np.any(np.diff(pairs[:, 0]) <= 0):
-        raise InputError(
-            f"{name} is {value!r}, expected a finite number or a table ((time, value), ...) of rising times"
-        )
-    if np.any(pairs[:, 1] < least):
-        raise InputError(f"{name} is {value!r}, expected {least:g} or more")
-    return [(float(time), float(number)) for time, number in pairs]
 
 
 def refuse_water(body: PoreWater, scheme: str) -> None:
