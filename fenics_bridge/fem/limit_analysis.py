@@ -107,8 +107,7 @@ def log_spiral_safety(
     Raises:
         InputError: angles or lengths out of range.
     """
-    if not 0 < unit_weight < math.inf:
-        raise InputError(f"unit_weight is {unit_weight!r} N/m3, expected a positive number")
+    _require_weight(unit_weight)
     _require_seismic(seismic)
     if friction_angle == 0 and _slides_on_a_level(friction_angle, depth, seismic):
         raise InputError(_without_depth(f"seismic={seismic:g} without friction"))
@@ -117,11 +116,7 @@ def log_spiral_safety(
     for _ in range(24):
         factor = math.sqrt(low * high)
         reduced = math.degrees(math.atan(math.tan(math.radians(friction_angle)) / factor))
-        stands = not _slides_on_a_level(reduced, depth, seismic) and (
-            reduced >= angle + _tilt(seismic)
-            or _best(_checked(height, angle, cohesion, reduced, depth, seismic)).load * cohesion / factor
-            > unit_weight * height
-        )
+        stands = _stands(height, angle, cohesion / factor, reduced, unit_weight, depth, seismic)
         low, high = (factor, high) if stands else (low, factor)
     return factor
 
@@ -144,19 +139,13 @@ def log_spiral_seismic(
     Raises:
         InputError: angles or lengths out of range, a slope that does not stand without inertia, or soil without friction and depth.
     """
-    if not 0 < unit_weight < math.inf:
-        raise InputError(f"unit_weight is {unit_weight!r} N/m3, expected a positive number")
+    _require_weight(unit_weight)
     if friction_angle == 0 and depth is None:
         raise InputError(_without_depth("friction_angle=0"))
     warn_of_radians(angle=angle, friction_angle=friction_angle)
 
     def stands(seismic: float) -> bool:
-        if _slides_on_a_level(friction_angle, depth, seismic):
-            return False
-        if friction_angle >= angle + _tilt(seismic):
-            return True
-        slope = _checked(height, angle, cohesion, friction_angle, depth, seismic)
-        return bool(_best(slope).load * cohesion > unit_weight * height)
+        return _stands(height, angle, cohesion, friction_angle, unit_weight, depth, seismic)
 
     if not stands(0.0):
         raise InputError(f"unit_weight is {unit_weight!r} N/m3, expected a slope that stands without inertia")
@@ -167,6 +156,24 @@ def log_spiral_seismic(
         middle = 0.5 * (low + high)
         low, high = (middle, high) if stands(middle) else (low, middle)
     return 0.5 * (low + high)
+
+
+def _stands(
+    height: float,
+    angle: float,
+    cohesion: float,
+    friction_angle: float,
+    unit_weight: float,
+    depth: float | None,
+    seismic: float,
+) -> bool:
+    """Whether no mechanism moves a slope."""
+    if _slides_on_a_level(friction_angle, depth, seismic):
+        return False
+    if friction_angle >= angle + _tilt(seismic):
+        return True
+    slope = _checked(height, angle, cohesion, friction_angle, depth, seismic)
+    return bool(_best(slope).load * cohesion > unit_weight * height)
 
 
 class _Slope(NamedTuple):
@@ -205,6 +212,11 @@ def _without_depth(given: str) -> str:
         f"depth is None with {given}, expected the depth of the ground below the toe [m]: inertia moves ground that is deep enough, "
         "however strong it is"
     )
+
+
+def _require_weight(unit_weight: float) -> None:
+    if not 0 < unit_weight < math.inf:
+        raise InputError(f"unit_weight is {unit_weight!r} N/m3, expected a positive number")
 
 
 def _require_seismic(seismic: Any) -> None:
