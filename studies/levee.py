@@ -101,7 +101,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
 
 
 class Followed:
-    """Soil that the history follows: crest, surface of the free field, toes, and sand in the free field, below a toe and below the crest. Collective."""
+    """Soil that the history follows: crest, toes, surface and sand of the free field, sand below a toe and the crest. Collective."""
 
     def __init__(self, model: mpm.Model, a: Namespace) -> None:
         left, right = a.beside, a.beside + 2 * a.slope * a.height + a.crest

@@ -12,6 +12,7 @@ from ._core import InputError
 from .ground_column import Layers
 from .mesh import cell_sizes
 from .resting import represented
+from .water_checks import filled_fraction
 
 SAME_LEVEL = 1e-6
 """Difference in height, over that of the side, of nodes on one level"""
@@ -150,8 +151,7 @@ def _pores(model: Any) -> NDArray[np.float64]:
     if model._core.has_two_phases:
         content = p.water_mass / p.volume
     else:
-        filled = p.saturation if len(p.saturation) else 1.0
-        content = filled * water.density * p.porosity * (1 + p.pore_pressure / water.modulus)
+        content = filled_fraction(p) * water.density * p.porosity * (1 + p.pore_pressure / water.modulus)
     ratios = np.ones((len(p), dim))
     if water.anisotropy:
         ratios = np.diagonal(np.array(water.anisotropy), axis1=1, axis2=2)[p.material, :dim]

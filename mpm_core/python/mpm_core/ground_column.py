@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._core import RunError, fast_wave_squared
-from .ground_water import GroundWater, to_levels
+from .ground_water import GroundWater, lumped, to_levels
 from .rayleigh import Rayleigh
 
 Floats = NDArray[np.float64]
@@ -110,14 +110,12 @@ class GroundColumn:
         p_wave, shear = np.empty((2, n))
         for law, rows in self._pieces:
             p_wave[rows], shear[rows] = law.wave_moduli(self.stress[rows], self._state_of(law, rows)).T
-        self._moduli = np.column_stack(
-            [shear] * (dim - 1) + [p_wave]
-        )  # (n, D), of the soil across and along the column
+        self._moduli = np.column_stack([shear] * (dim - 1) + [p_wave])  # (n, D), across and along the column
         self._lame = p_wave - 2 * shear
         self._mass = self._density * self._thickness
         self._coupled = (self._mass * layers.coupled_mass)[:, None]
         self._own = 0.5 * self._mass[:, None] - self._coupled
-        self._nodal_mass = to_levels(0.5 * self._mass, 0.5 * self._mass)
+        self._nodal_mass = lumped(self._mass)
         highest = np.maximum(p_wave, [laws[k].p_wave_modulus for k in self._law])  # as it may become
         of_soil, speeds = self._density, np.sqrt(highest / self._density)
         self._base_moduli = self._moduli[0].copy()  # of the ground below, undrained where it has water
@@ -130,6 +128,7 @@ class GroundColumn:
             of_soil = self._density - pores[:, -2]
             parts = np.column_stack([highest, np.full(n, water.modulus), pores[:, 0], of_soil, pores[:, -2]])
             speeds = np.sqrt([fast_wave_squared(*row) for row in parts])
+            self._standing_start = self._water.standing_at(self.heights, layers.time)
             self._base_moduli[-1] += self._water.stiffness[0]
         critical, critical_of_soil = (
             float((self._thickness / speed).min()) for speed in (speeds, np.sqrt(highest / of_soil))
@@ -211,8 +210,8 @@ class GroundColumn:
             force[:, -1] += self._water.loads_of(self.time)
             self._water.accelerate(self.dt, force, self._is_held(), self.time)
         if self._rayleigh.mass > 0:  # as gravity, on soil and water alike (docs/water.md)
-            half = 0.5 * self._rayleigh.mass * self._mass * damped
-            force -= to_levels(half, half)[:, None] * self._velocity_of_soil()
+            rate = self._rayleigh.mass * lumped(self._mass * damped)
+            force -= rate[:, None] * self._velocity_of_soil()
         change = self.dt * force / self._nodal_mass[:, None]
         self._take(change)
         self._displacement += self.dt * self.velocity[0]
@@ -276,6 +275,6 @@ class GroundColumn:
         length = to_levels(self._thickness, self._thickness)
         means = to_levels(traction, traction) / length[:, None]
         if self._water:
-            start, now = (self._water.standing_at(self.heights, time) for time in (self._start, self.time))
-            means += (now - start)[:, None] * self._normal
+            risen = self._water.standing_at(self.heights, self.time) - self._standing_start
+            means += risen[:, None] * self._normal
         return means

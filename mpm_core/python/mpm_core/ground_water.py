@@ -20,6 +20,11 @@ def to_levels(lower: Floats, upper: Floats) -> Floats:
     return total
 
 
+def lumped(values: Floats) -> Floats:
+    """Values of layers, half of each at the level below and half at the level above, (n + 1, ...)."""
+    return to_levels(0.5 * values, 0.5 * values)
+
+
 class GroundWater:
     """Pore water of layers, with a velocity w of its own beside that of the soil v, as in explicit steps of a model.
 
@@ -45,7 +50,7 @@ class GroundWater:
         self.porosity, self._conductivity = pores[:, 0].copy(), pores[:, 1:-2].copy()
         self.mass = pores[:, -2] * thickness
         """Mass of the water [kg/m2], (n)"""
-        self._soil = to_levels(0.5 * (mass - self.mass), 0.5 * (mass - self.mass))[:, None]
+        self._soil = lumped(mass - self.mass)[:, None]
         self.pressure = pores[:, -1].copy()
         """Pore pressure [Pa], (n)"""
         self.relative = np.zeros((len(thickness) + 1, self._conductivity.shape[1]))
@@ -66,8 +71,7 @@ class GroundWater:
 
     def loads_of(self, time: float) -> Floats:
         """Vertical forces on soil and water since the start [N/m2], (n + 1): the weight of the water, and that which stands above."""
-        half = -0.5 * self._gravity * (self.mass - self._mass_start)
-        loads = to_levels(half, half)
+        loads = -self._gravity * lumped(self.mass - self._mass_start)
         loads[-1] -= self._standing(time) - self._standing_start
         return loads
 
@@ -92,9 +96,9 @@ class GroundWater:
         on_water = np.zeros_like(force)
         on_water[:, -1] = filled * pressures - self._gravity * self._at_levels
         unit_weight = self._water.density * LABORATORY_GRAVITY
-        half = 0.5 * (self._thickness * self.porosity**2)[:, None] * unit_weight / self._conductivity
+        drag = lumped((self._thickness * self.porosity**2)[:, None] * unit_weight / self._conductivity)
         free = self.relative + dt * (on_water / water - (force - on_water) / self._soil)
-        self.relative = free / (1 + dt * to_levels(half, half) * (1 / self._soil + 1 / water))
+        self.relative = free / (1 + dt * drag * (1 / self._soil + 1 / water))
         self.relative[0, slice(None) if held else -1] = 0.0
 
     def follow(self, dt: float, strain: Floats, time: float) -> None:
@@ -121,17 +125,16 @@ class GroundWater:
 
     def _sum_at_levels(self) -> None:
         """Find the mass of the water [kg/m2] and the thickness of soil [m] of the levels, (n + 1)."""
-        half = 0.5 * np.column_stack([self.mass, self._thickness])
-        self._at_levels, self._around = to_levels(half, half).T
+        self._at_levels, self._around = lumped(np.column_stack([self.mass, self._thickness])).T
 
-    def standing_at(self, heights: Floats, time: float) -> Floats:
-        """Hydrostatic pressure below the level of the water that stands over the ground [Pa], (m), at heights [m]."""
+    def standing_at(self, heights: Any, time: float) -> Any:
+        """Hydrostatic pressure below the level of the water that stands over the ground [Pa], at a height or heights [m]."""
         if not self._water.standing:
-            return np.zeros(len(heights))
+            return 0.0 * heights
         times, levels = zip(*self._water.standing)
         level = float(np.interp(time, times, levels))
         return np.maximum(0.0, self._water.density * self._gravity * (level - heights))
 
     def _standing(self, time: float) -> float:
         """Pressure of the water that stands over the surface [Pa]."""
-        return float(self.standing_at(np.array([self._surface]), time)[0])
+        return float(self.standing_at(self._surface, time))

@@ -20,7 +20,7 @@ from .mesh import Tag, floats
 from .parameter_fields import Field
 from .particles import Particles
 from .retention import curves_of_laws, joined
-from .water_checks import density_of_water, require_pores, require_saturation, require_soil
+from .water_checks import density_of_water, filled_fraction, require_pores, require_saturation, require_soil
 from .water_tables import History, Value, history_of
 
 WaterCondition: TypeAlias = tuple[int, History, bool, bool, bool]
@@ -364,7 +364,7 @@ class PoreWater(Conditions):
         if self._core.has_two_phases:
             filled = np.minimum(pores, p.water_mass / self._core.water.density)
         else:
-            filled = pores * p.saturation if len(p.saturation) else pores
+            filled = pores * filled_fraction(p)
         return self.comm.allreduce(float(np.sum(filled)))
 
     def water_inflow(self) -> float:

@@ -64,13 +64,18 @@ def require_saturation(saturation: NDArray, suction_limit: float, retention: Any
         )
 
 
+def filled_fraction(particles: Any) -> NDArray | float:
+    """Fraction of the pores that water fills while it moves with the soil [-], (n); 1 where all are full."""
+    return particles.saturation if len(particles.saturation) else 1.0
+
+
 def require_soil(model: PoreWater) -> None:
     """Raises InputError for particles of this rank without pores, or lighter than the water in them."""
     p, water = model.particles, model._core.water
     require_pores(p.porosity, p.conductivity)
     if model._core.has_two_phases:
         return
-    of_water = p.porosity * water.density * (p.saturation if len(p.saturation) else 1.0)
+    of_water = p.porosity * water.density * filled_fraction(p)
     density = p.mass / p.volume
     light = density <= of_water
     if light.any():
