@@ -186,10 +186,9 @@ class LoadVectors:
         """Forces of which the fraction `Load.held` acts, an array like `forces`, or 0"""
         self._space, self._facet_tags, self._cell_tags = space, facet_tags, cell_tags
         self._test = ufl.TestFunction(space) if test is None else test
-        dim = space.mesh.geometry.dim
-        self._down = [0.0] * (dim - 1) + [-1.0]
-        self._weight = {None: self._unit_body_force(ufl.dx, self._down)}
-        self._body_force: dict[int | None, list[NDArray[np.float64]]] = {}
+        self._body_force: dict[tuple[int | None, int], NDArray[np.float64]] = {}
+        self._upwards = space.mesh.geometry.dim - 1
+        self._unit_body_force(None, self._upwards)
         extent = np.ptp(space.mesh.geometry.x, axis=0).max() if len(space.mesh.geometry.x) else 0.0
         self._size = space.mesh.comm.allreduce(float(extent), MPI.MAX) ** (space.mesh.geometry.dim - 1)
         self._pressure: dict[int, NDArray[np.float64]] = {}
@@ -214,16 +213,16 @@ class LoadVectors:
         load = self.resolved(load)
         by_tag = weight_by_tag(load.unit_weight)
         elsewhere = by_tag.get(None, 0.0)
-        forces = elsewhere * self._weight[None]
+        forces = -elsewhere * self._unit_body_force(None, self._upwards)
         for tag in sorted(tag for tag in by_tag if tag is not None):
-            forces = forces + (by_tag[tag] - elsewhere) * self._unit_weight_of(tag)
+            forces = forces - (by_tag[tag] - elsewhere) * self._unit_body_force(tag, self._upwards)
         everywhere = np.zeros(self._space.mesh.geometry.dim)
         for tag in sorted(load.body_force, key=lambda tag: (tag is not None, tag or 0)):
             vector = _vector(self._space.mesh, load.body_force[tag], "body_force")
             beside = vector - everywhere
             everywhere = vector if tag is None else everywhere
-            for component, unit in zip(beside, self._unit_body_forces(tag)):
-                forces = forces + component * unit
+            for axis, component in enumerate(beside):
+                forces = forces + component * self._unit_body_force(tag, axis)
         for tag, pressure in load.pressure.items():
             forces = forces + pressure * self._unit_pressure(tag)
         for tag, traction in load.traction.items():
@@ -278,31 +277,18 @@ class LoadVectors:
                 text = f"{name}: no facet with the tag {label(self._facet_tags, tag)} is on the surface of the soil, expected one there"
                 agree(comm, text if force <= 1e-12 * self._size else None)
 
-    def _unit_body_force(self, dx: Any, axis: ArrayLike) -> Any:
-        along = fem.Constant(self._space.mesh, np.array(axis))
-        there = 1.0 if self.active is None else self.active
-        return assembled(
-            fem.form(weighted(there * ufl.inner(along, self._test), self._radius) * dx), self._space
-        ).array.copy()
-
-    def _cells_of(self, tag: Any) -> Any:
-        """Measure of the cells of a tag; None stands for all cells."""
-        if tag is None:
-            return ufl.dx
-        domain = self._space.mesh
-        return ufl.Measure("dx", domain=domain, subdomain_data=numbered_anew(domain, self._cell_tags, [[tag]]))(1)
-
-    def _unit_weight_of(self, tag: Any) -> Any:
-        if tag not in self._weight:
-            self._weight[tag] = self._unit_body_force(self._cells_of(tag), self._down)
-        return self._weight[tag]
-
-    def _unit_body_forces(self, tag: Any) -> Any:
-        """Nodal forces of 1 N/m3 along each axis in the cells of a tag, or in all."""
-        if tag not in self._body_force:
-            dx = self._cells_of(tag)
-            self._body_force[tag] = [self._unit_body_force(dx, axis) for axis in np.eye(self._space.mesh.geometry.dim)]
-        return self._body_force[tag]
+    def _unit_body_force(self, tag: int | None, axis: int) -> NDArray[np.float64]:
+        """Nodal forces of 1 N/m3 along an axis in the cells of a tag, or in all for None."""
+        if (tag, axis) not in self._body_force:
+            domain, dx = self._space.mesh, ufl.dx
+            if tag is not None:
+                of_tag = numbered_anew(domain, self._cell_tags, [[tag]])
+                dx = ufl.Measure("dx", domain=domain, subdomain_data=of_tag)(1)
+            along = fem.Constant(domain, np.eye(domain.geometry.dim)[axis])
+            there = 1.0 if self.active is None else self.active
+            form = fem.form(weighted(there * ufl.inner(along, self._test), self._radius) * dx)
+            self._body_force[tag, axis] = assembled(form, self._space).array.copy()
+        return self._body_force[tag, axis]
 
     def _unit_pressure(self, tag: Any) -> Any:
         if tag not in self._pressure:
