@@ -26,11 +26,14 @@ from mpm_core import _core
 class AveragedKinematics:
     """Strain of linear simplices whose volumetric part is averaged over nodes (paper, section 5; Detournay, Dzik).
 
-    With theta_c = div u in a cell, theta_i the mean over the cells around a node by volume, and thetabar_c the mean of
+    With theta_c = div u in a cell, theta_i the mean by volume over the cells around a node, and thetabar_c the mean of
     theta_i over a cell's nodes, the in-plane normal strains are raised by (thetabar_c - theta_c) / d; all three of them,
     with d = 3, in 3D and in axisymmetric bodies, whose hoop strain is that at the centroid.
     Strain is then a constant matrix times displacement, over two rings of cells, and the internal forces are its
     transpose times stress: the mean stress is averaged too, and the tangent is symmetric where the law's is.
+
+    A node between soils of different stiffness has a mean for each of them (`stiffness_groups` in
+    materials/laws/stiffness_groups.h), so that the strain of the softer soil does not become stress of the stiffer one.
 
     Soil with friction whose flow dilates less than associated flow is an exception. Forces that are averaged in full do not feel
     pressures that alternate from cell to cell, and where flow does not change the volume a mechanism would pass through the cells
@@ -69,8 +72,10 @@ class AveragedKinematics:
         displacements, dofs = self._displacements(further is not None)
         dofs, nodes, gradients, volumes, radii = self._cells(displacements, dofs, geometry == Geometry.AXISYMMETRIC)
         n_own = self._n_dofs, displacements.dofmap.index_map.size_local
+        by_law = np.array(_core.stiffness_groups(list(laws)))
+        present, groups = points.material >= 0, by_law[np.maximum(points.material, 0)]
         self._strain = AveragedStrain(
-            self._space.mesh.comm, n_own, dofs, nodes, gradients, volumes, radii, points.material >= 0
+            self._space.mesh.comm, n_own, dofs, nodes, gradients, volumes, radii, present, groups, by_law.max() + 1
         )
         self._assembled = AssembledStiffness(self._strain) if assembled else None
         self._without = None if assembled else Kinematics(increment, points, constraints, geometry)

@@ -18,6 +18,9 @@ class AveragedStrain:
     stress remains as it is, also where soils of different fractions meet. Multiplied out, its rows reach over two rings of cells
     (60 times d entries in three dimensions); B and the two factors of M have 3 to 12.
 
+    Cells of different groups are averaged apart: each group has a mean of its own at a node. Equilibrium gives soils of
+    different stiffness different strains where they meet.
+
     Args:
         comm: ranks of the body.
         n_own: numbers of this rank's own degrees of freedom and nodes.
@@ -27,6 +30,8 @@ class AveragedStrain:
         volumes: volumes of the cells, those of one radian in an axisymmetric body, (n,).
         radii: radii of the centroids [m] in an axisymmetric body, (n,), else None.
         present: whether a cell is there, (n,); others take no part in the means.
+        groups: number of the group of each cell, from 0, (n,).
+        n_groups: number of groups over all ranks.
     """
 
     def __init__(
@@ -39,6 +44,8 @@ class AveragedStrain:
         volumes: NDArray[np.float64],
         radii: NDArray[np.float64] | None,
         present: NDArray[np.bool_],
+        groups: NDArray[np.integer],
+        n_groups: int,
     ) -> None:
         (n, corners, dim), (n_dofs, n_nodes) = gradients.shape, n_own
         self.size = 4 if dim == 2 else 6
@@ -52,8 +59,9 @@ class AveragedStrain:
         rows, columns = _strain_rows(gradients, radii), np.repeat(dofs.reshape(n, corners * dim), self.size, axis=0)
         self.plain = matrix(comm, (n * self.size, n_dofs), columns, rows)
         """The plain strain"""
-        self.mean_of_nodes = matrix(comm, (n, n_nodes), nodes, 1 / corners)
-        """The mean over a cell's nodes"""
+        means = nodes * n_groups + groups[:, None]
+        self.mean_of_nodes = matrix(comm, (n, n_nodes * n_groups), means, 1 / corners)
+        """The mean over a cell's nodes, of the values that its group has there"""
         self._present, self.corners = present, corners
         self._strain_of, self._over_nodes = _Product(self.plain), _Product(self.mean_of_nodes)
         # Products with PETSc's own transposes would add up what ranks send in the order in which it arrives.
@@ -61,7 +69,7 @@ class AveragedStrain:
         self._to_nodes = _Product(self.mean_of_nodes.transpose(PETSc.Mat()))
 
     def weights(self, fractions: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Weights of the mean over the cells around a node: the volume of each cell in it, and one over their sum per own node.
+        """Weights of the means over the cells around a node: the volume of each cell in its own, and one over the sum of each mean.
 
         Collective.
 
@@ -69,7 +77,7 @@ class AveragedStrain:
             fractions: by which the cells are averaged, (n,).
 
         Returns:
-            Shapes (n,) [m^D] and (nodes,) [1/m^D]; the second is zero where no cell around a node is averaged.
+            Shapes (n,) [m^D] and (nodes * groups,) [1/m^D]; the second is zero where no cell around a node is averaged.
         """
         volumes = fractions * self.volumes * self._present
         around = self.corners * self._to_nodes(volumes)

@@ -225,6 +225,7 @@ template <class G>
 void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
 {
   choose_forces(model, options.integration, options.nmd ? Averages::of_steps : Averages::none);
+  choose_groups(model, options.nmd);
   model.exchange.reproducible = options.reproducible;
   if (options.reproducible)
     sum_rounded_moments(model);

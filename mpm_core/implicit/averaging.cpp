@@ -8,10 +8,11 @@ template <class G, int D>
 void volumetric_force_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
                               BlockEntries& entries)
 {
-  BlockSum sum(entries, {system.unknowns, 1}, system.number);
+  BlockSum sum(entries, {system.unknowns, 1}, system.number, numbers_of_means(system));
   const bool dries = step.pore.flows && !step.pore.drying.empty();
   for (Index c : step.cells)
   {
+    const auto means = means_of(mesh, system.groups, c);
     for (int k = 0; k <= D; ++k)
     {
       Vector<D> force = internal_force<G>(step.tangents[c].by_volumetric, mesh.shapes[c], k);
@@ -19,9 +20,9 @@ void volumetric_force_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, 
         for (int i = 0; i < D; ++i)
           force[i] += at_surface->by_volumetric[k][i];
       force = product<D>(projector(system, mesh.cells[c][k]), force);
-      for (int l = 0; l <= D; ++l) // the cell has the mean of its nodes
+      for (int l = 0; l <= D; ++l) // the cell has the mean of its vertices
       {
-        double* block = sum.next(mesh.cells[c][k], mesh.cells[c][l]);
+        double* block = sum.next(mesh.cells[c][k], means[l]);
         for (int a = 0; a < D; ++a)
           block[a] += force[a] / (D + 1);
         if (dries && !step.pore.held[mesh.cells[c][k]])
@@ -35,18 +36,17 @@ template <class G, int D>
 void volumetric_strain_entries(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitSystem<D>& system,
                                BlockEntries& entries)
 {
-  BlockSum sum(entries, {1, system.unknowns}, system.number);
+  BlockSum sum(entries, {1, system.unknowns}, numbers_of_means(system), system.number);
   for (Index c : system.cells)
-    for (int k = 0; k <= D; ++k)
+    for (Index mean : means_of(mesh, system.groups, c))
     {
-      const Index node = mesh.cells[c][k];
       const double volume = averaged_strain_volume(mesh, field, c);
-      const double weight = volume == 0 ? 0 : volume / field.volumetric_strain[node].volume;
+      const double weight = volume == 0 ? 0 : volume / field.volumetric_strain[mean].volume;
       for (int l = 0; l <= D; ++l)
       {
         const Index other = mesh.cells[c][l];
         const Vector<D> change = product<D>(projector(system, other), dilation_gradient<G>(mesh.shapes[c], l));
-        double* block = sum.next(node, other);
+        double* block = sum.next(mean, other);
         for (int b = 0; b < D; ++b)
           block[b] += weight * change[b];
       }
@@ -57,10 +57,13 @@ template <class G, int D>
 void mean_stress_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, const ImplicitSystem<D>& system,
                          BlockEntries& by_displacement, BlockEntries& by_strain)
 {
-  BlockSum displacement(by_displacement, {1, system.unknowns}, system.number), strain(by_strain, {1, 1}, system.number);
+  const auto means = numbers_of_means(system);
+  BlockSum displacement(by_displacement, {1, system.unknowns}, means, system.number),
+      strain(by_strain, {1, 1}, means, means);
   for (Index c : step.cells)
   {
     const CellTangent<G>& tangent = step.tangents[c];
+    const auto vertices = means_of(mesh, system.groups, c);
     for (int l = 0; l <= D; ++l)
     {
       const Index other = mesh.cells[c][l];
@@ -70,13 +73,12 @@ void mean_stress_entries(const Mesh<D>& mesh, const ImplicitStep<G>& step, const
         for (int m = 0; m < n_gradient<G>; ++m)
           change[b] += tangent.mean_by_gradient[m] * rows[b][m] / (D + 1);
       change = product<D>(projector(system, other), change);
-      for (int k = 0; k <= D; ++k)
+      for (Index row : vertices)
       {
-        const Index row = mesh.cells[c][k];
         double* block = displacement.next(row, other);
         for (int b = 0; b < D; ++b)
           block[b] += change[b];
-        *strain.next(row, other) += tangent.mean_by_volumetric / ((D + 1) * (D + 1));
+        *strain.next(row, vertices[l]) += tangent.mean_by_volumetric / ((D + 1) * (D + 1));
       }
     }
   }

@@ -51,7 +51,7 @@ struct DrivenAxis
   double residual = 0; ///< R [N]
   std::vector<Vector<D>> column{};     ///< of B, at the nodes [N/m]
   std::vector<Vector<D>> row{};        ///< of C [N/m]
-  std::vector<double> row_by_strain{}; ///< the part of C by the nodes' averaged volumetric strains [N]
+  std::vector<double> row_by_strain{}; ///< the part of C by the nodes' averaged volumetric strains, by group [N]
 };
 
 /// All such axes, those of a body one after the other.

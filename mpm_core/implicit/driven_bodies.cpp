@@ -118,6 +118,7 @@ void add_particle(const Model<G>& model, const TouchingParticle<D>& at_surface, 
   const auto cell = static_cast<std::size_t>(at_surface.cell);
   const CellShape<D>& shape = model.mesh.shapes[cell];
   const auto weights = weights_at<D>(shape, at<D>(model.particles.position, at_surface.particle));
+  const auto means = means_of(model.mesh, model.fields.front().integration.groups, at_surface.cell);
   const std::size_t n = by.body_by_radius.size();
   for (std::size_t a = 0; a < n; ++a)
   {
@@ -135,7 +136,7 @@ void add_particle(const Model<G>& model, const TouchingParticle<D>& at_surface, 
       }
       driven.row[node][0] += weights[k] * by.body_by_radius[a] * at_surface.radius.by_motion;
       if (nmd)
-        driven.row_by_strain[node] += by_volumetric / (D + 1);
+        driven.row_by_strain[means[k]] += by_volumetric / (D + 1);
       else
       {
         const Vector<D> dilates = dilation_gradient<G>(shape, static_cast<int>(k));
@@ -221,12 +222,13 @@ void differentiate(Model<G>& model, ImplicitStep<G>& step)
 {
   DrivenBodies<D>& bodies = step.bodies;
   const std::size_t nodes = model.mesh.points.size(), n = bodies.axes.size();
+  const auto groups = static_cast<std::size_t>(model.fields.front().integration.groups.count);
   bodies.block.assign(n * n, 0.0);
   for (auto& driven : bodies.axes)
   {
     driven.column.assign(nodes, {});
     driven.row.assign(nodes, {});
-    driven.row_by_strain.assign(nodes, 0.0);
+    driven.row_by_strain.assign(groups * nodes, 0.0);
   }
   for (std::size_t first = 0, last; first < n; first = last)
   {
@@ -250,7 +252,8 @@ void differentiate(Model<G>& model, ImplicitStep<G>& step)
       bodies.block[k * (n + 1)] += driven.mass / (step.dt * step.dt);
     sum_shared(model.exchange, driven.column);
     sum_shared(model.exchange, driven.row);
-    sum_shared(model.exchange, driven.row_by_strain.data(), 1);
+    for (std::size_t group = 0; group < groups; ++group)
+      sum_shared(model.exchange, driven.row_by_strain.data() + group * nodes, 1);
   }
 }
 } // namespace

@@ -24,14 +24,16 @@ struct BlockEntries
 class BlockSum
 {
 public:
-  /// @param numbers  of this rank's nodes in the system
-  BlockSum(BlockEntries& entries, std::array<int, 2> shape, std::span<const GlobalIndex> numbers)
-      : _entries(entries), _numbers(numbers), _known(!entries.targets.empty())
+  /// @param rows     numbers in the system of what this rank's rows belong to: its nodes, or their means
+  /// @param columns  the same of the columns
+  BlockSum(BlockEntries& entries, std::array<int, 2> shape, std::span<const GlobalIndex> rows,
+           std::span<const GlobalIndex> columns)
+      : _entries(entries), _rows(rows), _columns(columns), _known(!entries.targets.empty())
   {
     entries.shape = shape;
     std::ranges::fill(entries.values, 0.0);
     if (!_known)
-      _first.assign(numbers.size(), none);
+      _first.assign(rows.size(), none);
   }
   ~BlockSum() { assert(_next == _entries.targets.size()); }
   BlockSum(const BlockSum&) = delete;
@@ -41,8 +43,8 @@ public:
   double* next(Index row, Index column)
   {
     if (!_known)
-      _entries.targets.push_back(find_or_make(row, _numbers[column]));
-    assert(is_next(_numbers[row], _numbers[column]));
+      _entries.targets.push_back(find_or_make(row, _columns[column]));
+    assert(is_next(_rows[row], _columns[column]));
     return target();
   }
 
@@ -80,13 +82,13 @@ private:
     for (Index block = _first[row]; block != none; block = _following[block])
       if (_entries.nodes[block][1] == column)
         return block;
-    const Index made = make(_numbers[row], column);
+    const Index made = make(_rows[row], column);
     _following[made] = std::exchange(_first[row], made);
     return made;
   }
 
   BlockEntries& _entries;
-  std::span<const GlobalIndex> _numbers;
+  std::span<const GlobalIndex> _rows, _columns;
   bool _known;
   std::size_t _next = 0;
   std::vector<Index> _first, _following; ///< the newest block of each row, and of each block the one before it
@@ -116,7 +118,7 @@ class TangentSum
 {
 public:
   TangentSum(const ImplicitSystem<D>& system, BlockEntries& entries)
-      : _system(system), _sum(entries, {system.unknowns, system.unknowns}, system.number)
+      : _system(system), _sum(entries, {system.unknowns, system.unknowns}, system.number, system.number)
   {
   }
 

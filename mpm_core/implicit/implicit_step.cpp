@@ -65,6 +65,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   stand_water(model, model.time + dt, gravity_at(model, model.time + dt));
   step.has_contacts = !model.contacts.empty();
   explicit_scheme::choose_forces(model, options.integration, averages_of(options));
+  choose_groups(model, options.nmd);
   map_to_nodes(model); // (11), (15)
   find_start_velocity(field);
   find_start_of_light_nodes(model.mesh, model.exchange, field);

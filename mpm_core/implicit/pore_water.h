@@ -72,7 +72,7 @@ double volume_strain(const Mesh<D>& mesh, const VelocityField<G>& field, double 
 template <class G, int D = G::dim>
 double growth_of(const Mesh<D>& mesh, const VelocityField<G>& field, const ImplicitStep<G>& step, Index cell)
 {
-  return step.options.nmd ? mean_of_nodes<D>(mesh.cells[cell], field.volumetric_strain)
+  return step.options.nmd ? mean_of_vertices<D>(mesh, field.integration.groups, cell, field.volumetric_strain)
                           : volume_strain(mesh, field, step.dt, cell);
 }
 

@@ -34,6 +34,17 @@ void set_supports(std::span<const Support<D>> supports, std::size_t nodes, Impli
   }
 }
 
+/// Numbers the means of the nodes where several groups of soils are averaged apart.
+template <int D>
+void number_means(const AveragedGroups& groups, ImplicitSystem<D>& system)
+{
+  system.groups = groups;
+  system.number_of_mean.clear();
+  for (int group = 0; groups.count > 1 && group < groups.count; ++group)
+    for (const GlobalIndex number : system.number)
+      system.number_of_mean.push_back(number == none ? none : groups.count * number + group);
+}
+
 /// Numbers and projectors of the nodes on the border of the far field, from the ranks that have them.
 /// @throws RunError on all ranks: a node without soil
 /// @note Collective where there is a far field
@@ -80,7 +91,7 @@ bool number_nodes(NodeExchange& exchange, const VelocityField<G>& field, const I
   for (const GhostFacet<D>& facet : step.ghosts)
     ghosts.push_back({facet.nodes[D], facet.nodes[D + 1]});
   int changed = owned != system.owned || step.cells != system.cells || ghosts != system.ghosts ||
-                step.has_contacts != system.has_contacts;
+                step.has_contacts != system.has_contacts || field.integration.groups.of_cell != system.groups.of_cell;
   MPI_Allreduce(MPI_IN_PLACE, &changed, 1, MPI_INT, MPI_MAX, exchange.comm);
 
   system.unknowns = step.pore.flows ? D + 1 : D;
@@ -105,6 +116,7 @@ bool number_nodes(NodeExchange& exchange, const VelocityField<G>& field, const I
     system.number[i] = sums[i][1] > 0 ? static_cast<GlobalIndex>(sums[i][0]) : none;
     system.diagonal[i] = sums[i][1];
   }
+  number_means(field.integration.groups, system);
   set_supports<D>(field.supports, sums.size(), system);
   system.border = border_nodes(exchange, field.far_field, system);
   return changed;

@@ -30,6 +30,8 @@ struct ImplicitSystem
   std::vector<Matrix<D>> projectors;        ///< P = 1 - sum d d^T of each support
   std::vector<double> diagonal;             ///< per node: elastic stiffness, the scale of its entries [N/m]
   std::vector<BorderNode<D>> border;        ///< all nodes of the border of the far field
+  AveragedGroups groups;                    ///< of the cells, with nodal mixed discretisation
+  std::vector<GlobalIndex> number_of_mean;  ///< likewise of each mean of a node, where there are several groups
   GlobalIndex total = 0;                    ///< nodes over all ranks
   bool has_contacts = false;                ///< with rigid surfaces
   int unknowns = D;                         ///< of each node
@@ -42,6 +44,13 @@ struct ImplicitSystem
 template <class G, int D = G::dim>
 bool number_nodes(NodeExchange& exchange, const VelocityField<G>& field, const ImplicitStep<G>& step,
                   ImplicitSystem<D>& system);
+
+/// Numbers of the means of this rank's nodes over all ranks: those of a node follow each other.
+template <int D>
+inline std::span<const GlobalIndex> numbers_of_means(const ImplicitSystem<D>& system)
+{
+  return system.groups.count == 1 ? system.number : system.number_of_mean;
+}
 
 /// P of a node: a vector without its supported directions.
 template <int D>

@@ -1,5 +1,6 @@
 #include "model/integration.h"
 
+#include "materials/laws/stiffness_groups.h"
 #include "model/mapping.h"
 #include "transfer/affine_field.h"
 
@@ -88,6 +89,51 @@ Working<G> full_cell_stress(const Mesh<D>& mesh, const VelocityField<G>& field, 
   return scaled_stress<G>(field.moments[cell].stress, volume / field.moments[cell].volume);
 }
 
+template <class G>
+void group_soils(Model<G>& model)
+{
+  for (std::size_t f = 0; f < model.fields.size(); ++f)
+  {
+    CellIntegration<G::dim>& integration = model.fields[f].integration;
+    integration.group_by_law.assign(model.laws.size(), -1);
+    std::vector<std::size_t> numbers;
+    std::vector<Law> laws;
+    for (std::size_t law = 0; law < model.laws.size(); ++law)
+      if (static_cast<std::size_t>(model.field_of_law[law]) == f)
+      {
+        numbers.push_back(law);
+        laws.push_back(model.laws[law]);
+      }
+    const std::vector<int> groups = materials::stiffness_groups(laws);
+    for (std::size_t k = 0; k < groups.size(); ++k)
+      integration.group_by_law[numbers[k]] = groups[k];
+    integration.n_groups = *std::ranges::max_element(groups) + 1; // each field has a law
+  }
+}
+
+template <class G, int D>
+void find_averaged_groups(const Mesh<D>& mesh, const std::vector<Run>& runs, VelocityField<G>& field)
+{
+  AveragedGroups& groups = field.integration.groups;
+  groups.of_cell.clear();
+  if (groups.count == 1)
+    return;
+  const auto count = static_cast<std::size_t>(groups.count);
+  auto& particles = field.integration.particles_of_group;
+  particles.assign(count * static_cast<std::size_t>(mesh.owned_cells), 0);
+  for (const std::span<const Run> each : {std::span(runs), std::span(std::as_const(field.resting.runs))})
+    for (const Run& run : each)
+      if (const int group = field.integration.group_by_law[run.material]; group >= 0)
+        particles[count * static_cast<std::size_t>(run.cell) + static_cast<std::size_t>(group)] += run.last - run.first;
+  groups.of_cell.resize(static_cast<std::size_t>(mesh.owned_cells));
+  for (std::size_t c = 0; c < groups.of_cell.size(); ++c)
+  {
+    const auto first = particles.begin() + static_cast<std::ptrdiff_t>(count * c);
+    const auto most = std::max_element(first, first + static_cast<std::ptrdiff_t>(count));
+    groups.of_cell[c] = static_cast<Index>(most - first);
+  }
+}
+
 template <class G, int D>
 void begin_integration(const Mesh<D>& mesh, NodeExchange& exchange, const Particles<D>& particles,
                        const std::vector<Run>& runs, VelocityField<G>& field)
@@ -149,6 +195,8 @@ Matrix<G::dim> dual_gradient(const Mesh<G::dim>& mesh, const VelocityField<G>& f
 
 #define INSTANTIATE(G)                                                                                                 \
   template Working<G> full_cell_stress(const Mesh<G::dim>&, const VelocityField<G>&, Index);                           \
+  template void group_soils(Model<G>&);                                                                                \
+  template void find_averaged_groups(const Mesh<G::dim>&, const std::vector<Run>&, VelocityField<G>&);                 \
   template void begin_integration(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&,                        \
                                   const std::vector<Run>&, VelocityField<G>&);                                         \
   template void average_gradients(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&);                              \

@@ -2,7 +2,7 @@
 /// @file
 /// How stresses are integrated over a cell (14), where not as the sum over its particles; see `Integration`.
 
-#include "model/velocity_field.h"
+#include "model/model.h"
 
 namespace mpm::model
 {
@@ -71,6 +71,23 @@ inline double averaged_strain_volume(const Mesh<D>& mesh, const VelocityField<G>
 {
   return averaged_strain_fraction(field.integration, cell) * integrated_volume(mesh, field, cell);
 }
+
+/// Finds the soils whose cells are averaged together over nodes: of each field those of like stiffness.
+template <class G>
+void group_soils(Model<G>& model);
+
+/// Averages these groups of soils apart from here on, or nothing.
+template <class G>
+inline void choose_groups(Model<G>& model, bool averages)
+{
+  for (VelocityField<G>& field : model.fields)
+    field.integration.groups.count = averages ? field.integration.n_groups : 1;
+}
+
+/// Finds the group in which each cell is averaged in this step: that of the most of its particles, of the softer soil
+/// where two have as many.
+template <class G, int D = G::dim>
+void find_averaged_groups(const Mesh<D>& mesh, const std::vector<Run>& runs, VelocityField<G>& field);
 
 /// Finds what the cells integrate in this step, where it is not the sum over their particles: a full cell integrates
 /// the mean stress of its particles over its volume (mixed), or the mean stress by the weights of dual domains.

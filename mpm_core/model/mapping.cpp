@@ -48,7 +48,6 @@ template <class G, class IntegralOf>
 void average_mean_stress(const Mesh<G::dim>& mesh, NodeExchange& exchange, VelocityField<G>& field,
                          IntegralOf&& integral_of)
 {
-  field.mean_stress.resize(mesh.points.size());
   auto& own = field.integration.mean_stress_of_cell; // kept for what follows, since moments are far apart in memory
   own.resize(static_cast<std::size_t>(mesh.owned_cells));
   const auto volume_of = [&](Index c)
@@ -58,7 +57,7 @@ void average_mean_stress(const Mesh<G::dim>& mesh, NodeExchange& exchange, Veloc
   };
   const auto keep_integral = [&](Index c, double)
   { return own[c].value = averaged_fraction(field.integration, c) * integral_of(c); };
-  average_over_nodes(mesh, field.part, volume_of, keep_integral, exchange, field.mean_stress);
+  average_over_nodes(mesh, field.part, field.integration.groups, volume_of, keep_integral, exchange, field.mean_stress);
 }
 
 /// By how much averaging changes the mean stress times volume of a filled cell.
@@ -66,7 +65,7 @@ template <class G, int D = G::dim>
 double change_by_averaging(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell)
 {
   const auto [integral, volume] = field.integration.mean_stress_of_cell[cell];
-  return volume * mean_of_nodes<D>(mesh.cells[cell], field.mean_stress) - integral;
+  return volume * mean_of_vertices<D>(mesh, field.integration.groups, cell, field.mean_stress) - integral;
 }
 
 /// Masses of the nodes, over all ranks, as they are and as they would be if the particles filled their cells evenly.
@@ -121,7 +120,7 @@ template <class G, int D = G::dim>
 void average_stress_of_soils(const Mesh<D>& mesh, NodeExchange& exchange, const std::vector<Run>& runs,
                              VelocityField<G>& field)
 {
-  if (!field.integration.fractions_given)
+  if (!field.integration.given)
     find_averaged_fractions(mesh, exchange, runs, field);
   average_mean_stress<G>(mesh, exchange, field, [&](Index c) { return mean_of<G>(integrated_stress(mesh, field, c)); });
 }
@@ -134,6 +133,8 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
   if (std::exchange(field.part_shrinks, false))
     shrink_part(mesh, exchange, field);
   begin_integration(mesh, exchange, particles, runs, field);
+  if (!field.integration.given)
+    find_averaged_groups(mesh, runs, field);
   const auto integrated = [&](Index c) { return integrated_stress(mesh, field, c); };
   const auto scatter_particles = [&](auto&& stress_of, std::span<const NodeSums<D>> of_resting_cells)
   {
@@ -285,8 +286,8 @@ void average_strains(const Mesh<D>& mesh, NodeExchange& exchange, const std::vec
                               }
                               return dt * divergence * volume;
                             };
-                            average_over_nodes(mesh, field.part, volume_of, strain_of, exchange,
-                                               field.volumetric_strain);
+                            average_over_nodes(mesh, field.part, field.integration.groups, volume_of, strain_of,
+                                               exchange, field.volumetric_strain);
                           });
 }
 

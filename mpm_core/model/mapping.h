@@ -132,7 +132,7 @@ void average_stresses(const Mesh<D>& mesh, NodeExchange& exchange, VelocityField
 template <class G, int D = G::dim>
 double averaged_strain(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell, double own)
 {
-  const double mean = mean_of_nodes<D>(mesh.cells[cell], field.volumetric_strain);
+  const double mean = mean_of_vertices<D>(mesh, field.integration.groups, cell, field.volumetric_strain);
   const double relaxed = field.integration.relaxing.empty() ? 0 : field.integration.relaxing[cell].strain;
   return own + averaged_strain_fraction(field.integration, cell) * (mean - own) + relaxed;
 }

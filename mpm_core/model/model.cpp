@@ -2,6 +2,7 @@
 
 #include "base/number_text.h"
 #include "model/affine.h"
+#include "model/integration.h"
 #include "model/mapping.h"
 #include "model/resting_nodes.h"
 #include "parallel/agreement.h"
@@ -61,6 +62,7 @@ void set_laws(Model<G>& model, std::vector<Law> laws, std::vector<Index> field_o
   model.laws = std::move(laws);
   model.field_of_law = std::move(field_of_law);
   model.fields.resize(static_cast<std::size_t>(most) + 1);
+  group_soils(model);
 }
 
 template <class G>
@@ -140,7 +142,6 @@ void clear_field(const Mesh<G::dim>& mesh, bool loaded, VelocityField<G>& field)
   field.nodes.assign(nodes, {});
   for (auto* values : {&field.start_velocity, &field.acceleration, &field.velocity_change, &field.velocity})
     values->assign(nodes, {});
-  field.volumetric_strain.resize(nodes);
   field.part = {};
   field.resting = {};
   field.left.clear();

@@ -127,24 +127,20 @@ double shear_rate(const Mesh<D>& mesh, const VelocityField<G>& field, Index cell
 template <class G, int D = G::dim>
 void sum_pressures(Model<G>& model, const VelocityField<G>& field, std::vector<PressureNode<D>>& nodes)
 {
-  const auto each_term = [&](auto&& add)
+  const auto add_cell = [&](Index c, auto&& add)
   {
-    for (Index c : field.part.cells)
-    {
-      const RelaxingCell<D>& cell = field.integration.relaxing[c];
-      if (!(cell.compliance > 0))
-        continue;
-      const double volume = field.moments[c].volume;
-      PressureNode<D> term{volume, volume * cell.pressure, cell.centre};
-      for (double& coordinate : term.place)
-        coordinate *= volume;
-      for (Index node : model.mesh.cells[c])
-        add(node, term);
-    }
+    const RelaxingCell<D>& cell = field.integration.relaxing[c];
+    if (!(cell.compliance > 0))
+      return;
+    const double volume = field.moments[c].volume;
+    PressureNode<D> term{volume, volume * cell.pressure, cell.centre};
+    for (double& coordinate : term.place)
+      coordinate *= volume;
+    for (int k = 0; k <= D; ++k)
+      add(k, term);
   };
-  sum_at_nodes<PressureNode<D>>(
-      model.exchange, [&nodes](Index node) -> PressureNode<D>& { return nodes[node]; }, each_term);
-  sum_shared(model.exchange, nodes);
+  sum_at_means<PressureNode<D>>(model.mesh, field.part, field.integration.groups, model.exchange, std::span(nodes),
+                                add_cell);
 }
 
 /// M^-1 L P of the cells by the fraction that fades over a time [s]; none where the means of the nodes do not say what
@@ -160,13 +156,14 @@ void find_differences(const Mesh<D>& mesh, const std::vector<PressureNode<D>>& n
       continue;
     std::array<Vector<D>, D + 1> corners;
     double difference = cell.pressure;
+    const auto means = means_of(mesh, field.integration.groups, c);
     for (std::size_t k = 0; k <= D; ++k)
       for (int a = 0; a < D; ++a)
-        corners[k][a] = nodes[mesh.cells[c][k]].place[a] / nodes[mesh.cells[c][k]].volume;
+        corners[k][a] = nodes[means[k]].place[a] / nodes[means[k]].volume;
     if (!find_weights<D>(corners, cell.centre, mesh.shapes[c].volume, cell.weights))
       continue;
     for (std::size_t k = 0; k <= D; ++k)
-      difference -= cell.weights[k] * nodes[mesh.cells[c][k]].pressure / nodes[mesh.cells[c][k]].volume;
+      difference -= cell.weights[k] * nodes[means[k]].pressure / nodes[means[k]].volume;
     const double fraction = -std::expm1(-relaxed_per_shear_strain * time * shear_rate<G>(mesh, field, c));
     cell.strain = std::min(fraction, most_relaxed) * cell.compliance * difference;
   }
@@ -179,18 +176,20 @@ void subtract_transpose(Model<G>& model, const std::vector<PressureNode<D>>& nod
 {
   auto& cells = field.integration.relaxing;
   std::vector<double> given(nodes.size());
-  const auto each_term = [&](auto&& add)
+  const AveragedGroups& groups = field.integration.groups;
+  const auto add_cell = [&](Index c, auto&& add)
   {
-    for (Index c : field.part.cells)
-      for (std::size_t k = 0; cells[c].compliance > 0 && k <= D; ++k)
-        add(model.mesh.cells[c][k], field.moments[c].volume * cells[c].weights[k] * cells[c].strain);
+    for (int k = 0; cells[c].compliance > 0 && k <= D; ++k)
+      add(k, field.moments[c].volume * cells[c].weights[static_cast<std::size_t>(k)] * cells[c].strain);
   };
-  sum_at_nodes<double>(
-      model.exchange, [&given](Index node) -> double& { return given[node]; }, each_term);
-  sum_shared(model.exchange, given);
+  sum_at_means<double>(model.mesh, field.part, groups, model.exchange, std::span(given), add_cell);
   for (Index c : field.part.cells)
-    for (std::size_t k = 0; cells[c].compliance > 0 && k <= D; ++k)
-      cells[c].strain -= given[model.mesh.cells[c][k]] / nodes[model.mesh.cells[c][k]].volume;
+    if (cells[c].compliance > 0)
+    {
+      const auto means = means_of(model.mesh, groups, c);
+      for (std::size_t k = 0; k <= D; ++k)
+        cells[c].strain -= given[means[k]] / nodes[means[k]].volume;
+    }
 }
 } // namespace
 
@@ -202,7 +201,8 @@ void relax_pressures(Model<G>& model, double dt, VelocityField<G>& field)
   if (model.totals.steps % relaxation_interval != 0 || !(is_undrained || has_two_phases(model)))
     return;
   find_relaxing_cells(model, field);
-  std::vector<PressureNode<G::dim>> nodes(model.mesh.points.size());
+  const auto groups = static_cast<std::size_t>(field.integration.groups.count);
+  std::vector<PressureNode<G::dim>> nodes(groups * model.mesh.points.size());
   sum_pressures(model, field, nodes);
   find_differences(model.mesh, nodes, relaxation_interval * dt, field);
   subtract_transpose(model, nodes, field);

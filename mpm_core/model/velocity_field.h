@@ -56,10 +56,14 @@ struct CellIntegration
   std::vector<double> averaged_by_law;
   /// Strains are averaged in full wherever forces are averaged, by whatever fraction.
   bool strains_in_full = false;
-  bool fractions_given = false;         ///< whether `averaged_of_cell` is that of another field
   std::vector<double> averaged_of_cell; ///< per owned cell: the fraction of averaging; empty where it is one everywhere
+  std::vector<int> group_by_law;        ///< group in which the cells of a soil are averaged; -1 outside of the field
+  int n_groups = 1;                     ///< of its soils
+  AveragedGroups groups;                ///< of the cells in this step
+  bool given = false;                   ///< whether the fractions and groups of cells are those of another field
   std::vector<RelaxingCell<D>> relaxing;       ///< per owned cell, in explicit steps of undrained soil; else empty
   std::vector<NodeMass> masses;                ///< scratch, per node
+  std::vector<Index> particles_of_group;       ///< scratch, per owned cell and group
   std::vector<VolumeMean> mean_stress_of_cell; ///< scratch: integral and volume
   std::vector<std::array<double, 2>> fills;    ///< per node: volumes of particles and of cells around it
   std::vector<unsigned char> whole; ///< per owned cell, at the step's start: 1 where full; not with particles
@@ -101,7 +105,8 @@ struct VelocityField
   std::vector<Vector<D>> acceleration;       ///< a_i
   std::vector<Vector<D>> velocity_change;    ///< of the nodes, as the particles take it
   std::vector<Vector<D>> velocity;           ///< v_i that moves and strains the particles
-  std::vector<VolumeMean> volumetric_strain; ///< of the nodes; used with nodal mixed discretisation
-  std::vector<VolumeMean> mean_stress;       ///< of the nodes; empty until first used with it
+  std::vector<VolumeMean> volumetric_strain; ///< of the nodes, by group; empty until first used, with nodal mixed
+                                             ///< discretisation
+  std::vector<VolumeMean> mean_stress;       ///< likewise
 };
 } // namespace mpm::model

@@ -4,7 +4,6 @@
 #include "model/anisotropy.h"
 #include "model/integration.h"
 #include "model/mapping.h"
-#include "model/material_points.h"
 #include "parallel/agreement.h"
 
 #include <algorithm>
@@ -182,13 +181,13 @@ void follow_soil(const Mesh<G::dim>& mesh, const VelocityField<G>& soil, WaterFi
   // give a uniform pressure forces within the soil, which only a flow of the water could balance.
   motion.integration.kind = Integration::mixed;
   motion.integration.averaged_by_law.assign(soil.integration.averaged_by_law.size(), 1.0); // pressures in full
-  motion.integration.fractions_given = true; // where the soil's strains are averaged, so that both see one volume
+  motion.integration.given = true; // where the soil's strains are averaged, so that both see one volume
   motion.integration.averaged_of_cell.resize(soil.integration.averaged_of_cell.size());
   for (std::size_t c = 0; c < soil.integration.averaged_of_cell.size(); ++c)
     motion.integration.averaged_of_cell[c] = soil.integration.averaged_of_cell[c] > 0 ? 1 : 0;
+  motion.integration.groups = soil.integration.groups;
   motion.moments.resize(cells);
   motion.nodes.resize(nodes);
-  motion.volumetric_strain.resize(nodes);
   for (auto* values : {&motion.start_velocity, &motion.acceleration, &motion.velocity_change, &motion.velocity})
     values->resize(nodes);
   field.cells.resize(cells);
@@ -297,45 +296,17 @@ void average_outflow(const Mesh<G::dim>& mesh, NodeExchange& exchange, double dt
   // at rest where they balance its weight.
   const auto volume_of = [&](Index c) { return averaged_strain_volume(mesh, field.motion, c); };
   const auto outflow_of = [&](Index c, double volume) { return volume * outflow(mesh, field, c, dt); };
-  average_over_nodes(mesh, field.motion.part, volume_of, outflow_of, exchange, field.motion.volumetric_strain);
+  average_over_nodes(mesh, field.motion.part, field.motion.integration.groups, volume_of, outflow_of, exchange,
+                     field.motion.volumetric_strain);
 }
 
 template <class G>
 double averaged_outflow(const Mesh<G::dim>& mesh, const WaterField<G>& field, Index cell, double dt)
 {
   const double own = outflow(mesh, field, cell, dt);
-  const double mean = mean_of_nodes<G::dim>(mesh.cells[cell], field.motion.volumetric_strain);
+  const double mean =
+      mean_of_vertices<G::dim>(mesh, field.motion.integration.groups, cell, field.motion.volumetric_strain);
   return own + averaged_strain_fraction(field.motion.integration, cell) * (mean - own);
-}
-
-template <class G>
-std::vector<double> averaged_pressures(Model<G>& model)
-{
-  constexpr int D = G::dim;
-  const Mesh<D>& mesh = model.mesh;
-  const Particles<D>& particles = model.particles;
-  std::vector<VolumeMean> cells(static_cast<std::size_t>(mesh.owned_cells)), nodes(mesh.points.size());
-  std::vector<Index> filled;
-  for (const MaterialPoints<D>& points : {material_points(model), resting_points(model)})
-    for (const Run& run : points.runs)
-    {
-      filled.push_back(run.cell);
-      for (Index p = run.first; p < run.last; ++p)
-      {
-        cells[run.cell].value += particles.volume[p] * particles.pore_pressure[0][p];
-        cells[run.cell].volume += particles.volume[p];
-      }
-    }
-  const MeshPart part = make_part<D>(mesh, filled, model.exchange.shared_nodes);
-  average_over_nodes(
-      mesh, part, [&](Index c) { return cells[c].volume; }, [&](Index c, double) { return cells[c].value; },
-      model.exchange, nodes);
-  std::vector<double> pressures(particles.size());
-  for (const MaterialPoints<D>& points : {material_points(model), resting_points(model)})
-    for (const Run& run : points.runs)
-      for (Index p = run.first; p < run.last; ++p)
-        pressures[p] = mean_of_nodes<D>(mesh.cells[run.cell], nodes);
-  return pressures;
 }
 
 #define INSTANTIATE(G)                                                                                                 \
@@ -346,7 +317,6 @@ std::vector<double> averaged_pressures(Model<G>& model)
   template void find_flux(const Mesh<G::dim>&, const VelocityField<G>&, const PoreWater&, WaterField<G>&);             \
   template double averaged_outflow(const Mesh<G::dim>&, const WaterField<G>&, Index, double);                          \
   template double outflow(const Mesh<G::dim>&, const WaterField<G>&, Index, double);                                   \
-  template std::vector<double> averaged_pressures(Model<G>&);                                                          \
   template void average_outflow(const Mesh<G::dim>&, NodeExchange&, double, WaterField<G>&);
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)

@@ -54,11 +54,4 @@ void average_outflow(const Mesh<G::dim>& mesh, NodeExchange& exchange, double dt
 /// Mass that flows out of a unit of volume of a cell by these means, where pressures are averaged [kg/m3].
 template <class G>
 double averaged_outflow(const Mesh<G::dim>& mesh, const WaterField<G>& field, Index cell, double dt);
-
-/// Pore pressures that act on soil and water where volumetric strains are averaged, of the particles [Pa]: those of the
-/// cells, averaged over nodes as the forces are. What this takes out, such as an alternation from cell to cell, does no
-/// work.
-/// @note Collective
-template <class G>
-std::vector<double> averaged_pressures(Model<G>& model);
 } // namespace mpm::model

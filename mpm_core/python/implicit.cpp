@@ -144,9 +144,11 @@ void bind_bodies(py::class_<Implicit<G>>& bound)
                              [](const I& i)
                              {
                                std::vector<double> all;
+                               const std::size_t size = i.system.number.size();
                                for (const DrivenAxis<D>& driven : i.step.bodies.axes)
-                                 for (Index node : i.system.owned)
-                                   all.push_back(driven.row_by_strain[static_cast<std::size_t>(node)]);
+                                 for (Index node : i.system.owned) // in the order of `number_of_mean`
+                                   for (std::size_t mean = node; mean < driven.row_by_strain.size(); mean += size)
+                                     all.push_back(driven.row_by_strain[mean]);
                                return copied(all);
                              });
 }
@@ -223,6 +225,7 @@ void bind_implicit_step(py::module_& m, const std::string& suffix)
           },
           Release())
       .def_property_readonly("owned_nodes", [](const I& i) { return i.system.owned.size(); })
+      .def_property_readonly("owned_means", [](const I& i) { return i.system.groups.count * i.system.owned.size(); })
       .def_property_readonly("total_nodes", [](const I& i) { return i.system.total; })
       .def_property_readonly("points", &owned_points<G>)
       .def_property_readonly("unknowns", [](const I& i) { return i.system.unknowns; })

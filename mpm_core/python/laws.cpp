@@ -1,4 +1,5 @@
 #include "materials/laws/association.h"
+#include "materials/laws/stiffness_groups.h"
 #include "materials/laws/strength_reduction.h"
 #include "mesh/mesh.h"
 #include "python/bindings.h"
@@ -297,6 +298,8 @@ void bind_laws(py::module_& m)
       "fraction_of_averages", [](const Law& law) { return fraction_of_averages(law); }, py::arg("law"));
   m.def(
       "fraction_of_averaged_forces", [](const Law& law) { return fraction_of_averaged_forces(law); }, py::arg("law"));
+  m.def(
+      "stiffness_groups", [](const std::vector<Law>& laws) { return stiffness_groups(laws); }, py::arg("laws"));
   m.def("cell_sizes",
         py::vectorize([](double volume, int dim) { return dim == 2 ? cell_size<2>(volume) : cell_size<3>(volume); }),
         py::arg("volumes"), py::arg("dim"));

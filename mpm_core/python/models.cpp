@@ -5,6 +5,7 @@
 #include "explicit/run.h"
 #include "explicit/two_phase_step.h"
 #include "model/absorbing.h"
+#include "model/averaged_values.h"
 #include "model/contacts.h"
 #include "model/far_field.h"
 #include "model/integration.h"
@@ -270,6 +271,7 @@ void bind_model(py::module_& m, const std::string& suffix)
            {
              prepare(model);
              choose_forces(model, integration, nmd ? Averages::of_steps : Averages::none);
+             choose_groups(model, nmd);
              stand_water(model, model.time, gravity);
              map_to_nodes(model);
              return out_of_balance(model, gravity);
@@ -280,12 +282,12 @@ void bind_model(py::module_& m, const std::string& suffix)
              prepare(model);
              return integrated_stresses(model);
            })
-      .def("averaged_pressures",
-           [](M& model)
+      .def("averaged_over_nodes",
+           [](M& model, const py::array_t<double, py::array::c_style | py::array::forcecast>& values)
            {
-             prepare(model);
-             const std::vector<double> pressures = averaged_pressures(model);
-             return py::array_t<double>(static_cast<py::ssize_t>(pressures.size()), pressures.data());
+             const auto size = static_cast<std::size_t>(values.size());
+             const std::vector<double> averaged = averaged_over_nodes(model, std::span(values.data(), size));
+             return py::array_t<double>(static_cast<py::ssize_t>(size), averaged.data());
            })
       .def("run_explicit",
            [](M& model, const ExplicitOptions& options, const RunOptions& run)

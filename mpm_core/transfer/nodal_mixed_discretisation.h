@@ -6,6 +6,7 @@
 #include "parallel/rounded_sums.h"
 
 #include <span>
+#include <vector>
 
 namespace mpm::transfer
 {
@@ -17,44 +18,93 @@ struct VolumeMean
   double volume; ///< [m^D]
 };
 
-/// Means over the filled cells around each node of a part of the mesh (method of Detournay & Dzik 2006; with volume
-/// weights this followed by `mean_of_nodes` is its own transpose).
+/// Groups of cells that are averaged apart, each with a mean of its own at a node: soils that differ in stiffness.
+struct AveragedGroups
+{
+  int count = 1;
+  std::vector<Index> of_cell; ///< per owned cell; empty where there is one group
+};
+
+/// Where the means of a cell's vertices are: those of one group follow those of another, in the order of the nodes.
+template <int D>
+inline std::array<Index, D + 1> means_of(const Mesh<D>& mesh, const AveragedGroups& groups, Index cell)
+{
+  std::array<Index, D + 1> means = mesh.cells[cell];
+  if (!groups.of_cell.empty()) [[unlikely]]
+    for (Index& mean : means)
+      mean += groups.of_cell[cell] * static_cast<Index>(mesh.points.size());
+  return means;
+}
+
+/// Sums terms of the cells of a part of the mesh at the means of their vertices, over all ranks.
+/// @param means     sums, zero before, for each group as many as the mesh has nodes
+/// @param add_cell  calls its second argument, a callable (int vertex, const T& term), with the terms of a cell; a
+///                  callable (Index cell, auto&& add)
+/// @note Collective
+template <class T, int D, class AddCell>
+void sum_at_means(const Mesh<D>& mesh, const MeshPart& part, const AveragedGroups& groups, NodeExchange& exchange,
+                  std::span<T> means, AddCell&& add_cell)
+{
+  const std::size_t size = mesh.points.size();
+  for (int group = 0; group < groups.count; ++group)
+  {
+    const auto own = means.subspan(static_cast<std::size_t>(group) * size, size);
+    const auto each_term = [&](auto&& add)
+    {
+      for (Index c : part.cells)
+        if (groups.of_cell.empty() || groups.of_cell[c] == group)
+          add_cell(c, [&](int k, const T& term) { add(mesh.cells[c][k], term); });
+    };
+    sum_at_nodes<T>(
+        exchange, [own](Index node) -> T& { return own[node]; }, each_term);
+    sum_shared(exchange, own);
+  }
+}
+
+/// Means over the filled cells of each group around each node of a part of the mesh (method of Detournay & Dzik 2006;
+/// with volume weights this followed by `mean_of_vertices` is its own transpose).
 /// @param volume_of    filled volume of a cell, 0 where it is empty; a callable Index -> double
 /// @param integral_of  what is averaged, integrated over a filled cell; a callable (Index, volume) -> double
 /// @note Collective
 template <int D, class VolumeOf, class IntegralOf>
-void average_over_nodes(const Mesh<D>& mesh, const MeshPart& part, VolumeOf&& volume_of, IntegralOf&& integral_of,
-                        NodeExchange& exchange, std::span<VolumeMean> nodes)
+void average_over_nodes(const Mesh<D>& mesh, const MeshPart& part, const AveragedGroups& groups, VolumeOf&& volume_of,
+                        IntegralOf&& integral_of, NodeExchange& exchange, std::vector<VolumeMean>& means)
 {
-  const auto each_term = [&](auto&& add)
+  const std::size_t size = mesh.points.size(), all = static_cast<std::size_t>(groups.count) * size;
+  means.resize(all);
+  const auto for_each_mean = [&](auto&& work)
   {
-    for (Index c : part.cells)
-    {
-      const double volume = volume_of(c);
-      if (volume == 0)
-        continue;
-      const VolumeMean term{integral_of(c, volume), volume};
-      for (Index node : mesh.cells[c])
-        add(node, term);
-    }
+    for (std::size_t first = 0; first < all; first += size)
+      for (Index node : part.nodes)
+        work(means[first + static_cast<std::size_t>(node)]);
   };
-  for (Index node : part.nodes)
-    nodes[node] = {};
-  sum_at_nodes<VolumeMean>(
-      exchange, [nodes](Index node) -> VolumeMean& { return nodes[node]; }, each_term);
-  sum_shared(exchange, nodes);
-  for (Index node : part.nodes)
-    if (nodes[node].volume > 0)
-      nodes[node].value /= nodes[node].volume;
+  for_each_mean([](VolumeMean& mean) { mean = {}; });
+  const auto add_cell = [&](Index c, auto&& add)
+  {
+    const double volume = volume_of(c);
+    if (volume == 0)
+      return;
+    const VolumeMean term{integral_of(c, volume), volume};
+    for (int k = 0; k <= D; ++k)
+      add(k, term);
+  };
+  sum_at_means<VolumeMean>(mesh, part, groups, exchange, std::span(means), add_cell);
+  for_each_mean(
+      [](VolumeMean& mean)
+      {
+        if (mean.volume > 0)
+          mean.value /= mean.volume;
+      });
 }
 
-/// The mean of the values of a cell's nodes
+/// The mean of the values at a cell's vertices, of its group.
 template <int D>
-inline double mean_of_nodes(const std::array<Index, D + 1>& cell, std::span<const VolumeMean> nodes)
+inline double mean_of_vertices(const Mesh<D>& mesh, const AveragedGroups& groups, Index cell,
+                               std::span<const VolumeMean> means)
 {
   double sum = 0;
-  for (Index node : cell)
-    sum += nodes[node].value;
+  for (Index mean : means_of(mesh, groups, cell))
+    sum += means[mean].value;
   return sum * (1.0 / (D + 1));
 }
 } // namespace mpm::transfer

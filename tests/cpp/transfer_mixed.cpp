@@ -22,16 +22,17 @@ std::vector<double> filled_volumes(const Mesh<D>& mesh, double empty_share)
 }
 
 template <int D>
-std::vector<double> averaged(const Mesh<D>& mesh, const std::vector<double>& volume, std::vector<double> theta)
+std::vector<double> averaged(const Mesh<D>& mesh, const std::vector<double>& volume, std::vector<double> theta,
+                             const AveragedGroups& groups = {})
 {
   NodeExchange exchange; // one rank: nothing is shared
   std::vector<VolumeMean> nodes(mesh.points.size());
   const auto volume_of = [&](Index c) { return volume[c]; };
   const auto integral_of = [&](Index c, double filled) { return filled * theta[c]; };
-  average_over_nodes(mesh, mpm::test::whole(mesh), volume_of, integral_of, exchange, nodes);
+  average_over_nodes(mesh, mpm::test::whole(mesh), groups, volume_of, integral_of, exchange, nodes);
   for (Index c = 0; c < mesh.n_cells(); ++c)
     if (volume[c] > 0)
-      theta[c] = mean_of_nodes<D>(mesh.cells[c], nodes);
+      theta[c] = mean_of_vertices<D>(mesh, groups, c, nodes);
   return theta;
 }
 } // namespace
@@ -95,5 +96,34 @@ TYPED_TEST(MixedDiscretisationTest, AveragesOverFilledCellsThatShareNodes)
     {
       EXPECT_NEAR(after[c], mean, 1e-15);
     }
+  }
+}
+
+TYPED_TEST(MixedDiscretisationTest, AveragesGroupsApart)
+{
+  // Each group has the means that it has when the cells of the others are empty.
+  constexpr int D = TypeParam::value;
+  const Mesh<D> mesh = mpm::test::box<D>(4, 0.15).mesh();
+  const auto volume = filled_volumes(mesh, 0.3);
+  std::mt19937 random(10);
+  std::vector<double> theta;
+  AveragedGroups groups{3, {}};
+  for (std::size_t c = 0; c < volume.size(); ++c)
+  {
+    theta.push_back(std::uniform_real_distribution<double>(-1, 1)(random));
+    groups.of_cell.push_back(static_cast<Index>(random() % 3));
+  }
+  const auto apart = averaged(mesh, volume, theta, groups);
+  for (int group = 0; group < groups.count; ++group)
+  {
+    auto own = volume;
+    for (std::size_t c = 0; c < own.size(); ++c)
+      own[c] *= groups.of_cell[c] == group;
+    const auto alone = averaged(mesh, own, theta);
+    for (std::size_t c = 0; c < own.size(); ++c)
+      if (own[c] > 0)
+      {
+        EXPECT_EQ(apart[c], alone[c]);
+      }
   }
 }

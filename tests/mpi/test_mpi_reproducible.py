@@ -55,6 +55,17 @@ def test_other_laws_are_the_same_to_the_last_bit(comm, law):
     assert_identical(*map(all_by_id, models))
 
 
+def test_soils_that_are_averaged_apart_are_the_same_to_the_last_bit(comm):
+    models = [
+        sliding_slope(of, scattered, laws=[CLAY, mpm.LinearElastic(young=20e6, poisson=0.3)])
+        for of in (comm, MPI.COMM_SELF)
+    ]
+    for model in models:
+        model.assign((model.particles.position[:, 1] < 0.15).astype(np.int32))  # the boundary is within cells
+        model.explicit(until=0.3, reproducible=True, nmd=True, integration=mpm.Integration.MIXED).last()
+    assert_identical(*map(all_by_id, models))
+
+
 def test_a_heap_in_space_is_the_same_to_the_last_bit_though_it_is_rebalanced(comm):
     models = []
     for of in (comm, MPI.COMM_SELF):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from dolfinx.mesh import compute_midpoints, meshtags
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -81,23 +82,32 @@ def slope_particles(unit_weight, cell_size=0.1, kind="crossed", law=None, comm=M
 CLAY = {"young": 1e6, "poisson": 0.45, "cohesion": 8e3, "friction_angle": 0.0}
 
 
-def clay_block(geometry, comm=MPI.COMM_WORLD, law=None, **options):
-    """(finite elements, particles in their cells) of clay, or another soil, that stands free on rough ground; both average strains."""
+def clay_block(geometry, comm=MPI.COMM_WORLD, law=None, below=None, **options):
+    """(finite elements, particles in their cells) of clay, or another soil, that stands free on rough ground; both average strains.
+
+    below: law of the lower half; that of the upper one by default.
+    """
     axisymmetric = geometry == bridge.Geometry.AXISYMMETRIC
     dim = 3 if geometry == bridge.Geometry.SOLID else 2
-    domain, tags, facet_tags = bridge.box_mesh(comm, [1.0] * dim, [3 if dim == 3 else 6] * dim)
+    domain, _, facet_tags = bridge.box_mesh(comm, [1.0] * dim, [4 if dim == 3 else 6] * dim)
     law = law or mpm.MohrCoulomb(**CLAY)
+    laws = {1: law, 2: below or law}
+    index_map = domain.topology.index_map(dim)
+    cells = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+    heights = compute_midpoints(domain, dim, cells)[:, dim - 1]
+    tags = meshtags(domain, dim, cells, np.where(heights < 0.5, 2, 1).astype(np.int32))
     base = 2 * dim - 1
     supports = [bridge.roller(1, np.eye(dim)[0]), bridge.fixed(base)]
     fem = bridge.QuasiStatic(
-        domain, law, facet_tags, supports, 1, geometry=geometry if axisymmetric else None, nmd=True,
+        domain, laws, facet_tags, supports, 1, geometry=geometry if axisymmetric else None, nmd=True, cell_tags=tags,
         solver=bridge.Solver(tolerance=1e-11), **options,
     )  # fmt: skip
     fem.solve(bridge.Load(unit_weight=18e3))
     assert fem.converged
     mesh = bridge.background_mesh(domain, tags, facet_tags)
-    model = mpm.Model(mesh, law, **({"geometry": geometry} if axisymmetric else {}))
-    model.seed(density=18e3 / 9.81, per_cell={3: 4, 2: 3}[dim])
+    model = mpm.Model(mesh, list(laws.values()), **({"geometry": geometry} if axisymmetric else {}))
+    for material, tag in enumerate(laws):
+        model.seed(density=18e3 / 9.81, per_cell={3: 4, 2: 3}[dim], cell_tag=tag, material=material)
     model.roller(1, np.eye(dim)[0])
     model.fix(base)
     model.set_gravity([0.0] * (dim - 1) + [-9.81])

@@ -48,7 +48,7 @@ def linear_elastic_solution(points, cells, law, weight, held):
 def tangent(step, dim):
     """J of an assembled implicit step on one rank; with nodal mixed discretisation the product is added, with pore water J has
     the pressures too."""
-    nodes, dofs = step.total_nodes, step.total_nodes * step.unknowns
+    means, dofs = step.owned_means, step.total_nodes * step.unknowns
 
     def matrix(places, values, shape):
         return sp.csr_matrix((values, places), shape=shape)
@@ -57,20 +57,20 @@ def tangent(step, dim):
     force, strain = step.volumetric_force_values(), step.volumetric_strain_values()
     if len(force) == 0:
         return j
-    g = matrix(step.volumetric_strain_places(), strain, (nodes, dofs))
-    j = j + matrix(step.volumetric_force_places(), force, (dofs, nodes)) @ g
+    g = matrix(step.volumetric_strain_places(), strain, (means, dofs))
+    j = j + matrix(step.volumetric_force_places(), force, (dofs, means)) @ g
     if len(step.mean_stress_values()) == 0:
         return j
-    h = matrix(step.mean_stress_by_strain_places(), step.mean_stress_by_strain_values(), (nodes, nodes))
-    return j + g.T @ (matrix(step.mean_stress_places(), step.mean_stress_values(), (nodes, dofs)) + h @ g)
+    h = matrix(step.mean_stress_by_strain_places(), step.mean_stress_by_strain_values(), (means, means))
+    return j + g.T @ (matrix(step.mean_stress_places(), step.mean_stress_values(), (means, dofs)) + h @ g)
 
 
 def matrix_of_strains(step, dim, by_strain):
-    """Rows by the nodes' averaged volumetric strains, (k, nodes), as rows by displacements, (k, unknowns)."""
+    """Rows by the nodes' averaged volumetric strains, (k, means), as rows by displacements, (k, unknowns)."""
     strain = step.volumetric_strain_values()
     if len(strain) == 0:
         return np.zeros((len(by_strain), step.total_nodes * step.unknowns))
-    shape = (step.total_nodes, step.total_nodes * step.unknowns)
+    shape = (step.owned_means, step.total_nodes * step.unknowns)
     return by_strain @ sp.csr_matrix((strain, step.volumetric_strain_places()), shape=shape)
 
 

@@ -45,17 +45,17 @@ class Tangent:
 
     def __init__(self, step: Any, comm: MPI.Comm, dim: int, prefix: str) -> None:
         n = step.unknowns
-        nodes, dofs = step.owned_nodes, step.owned_nodes * n
+        means, dofs = step.owned_means, step.owned_nodes * n
         self._stiffness = coo_matrix(comm, (dofs, dofs), (n, n), step.stiffness_places())
         self._averaged = comm.allreduce(len(step.volumetric_force_values())) > 0
         self._product: PETSc.Mat | None = None
         if self._averaged:
-            self._force = coo_matrix(comm, (dofs, nodes), (n, 1), step.volumetric_force_places())
-            self._strain = coo_matrix(comm, (nodes, dofs), (1, n), step.volumetric_strain_places())
+            self._force = coo_matrix(comm, (dofs, means), (n, 1), step.volumetric_force_places())
+            self._strain = coo_matrix(comm, (means, dofs), (1, n), step.volumetric_strain_places())
         self._conjugate = comm.allreduce(len(step.mean_stress_values())) > 0
         if self._conjugate:
-            self._mean_stress = coo_matrix(comm, (nodes, dofs), (1, n), step.mean_stress_places())
-            self._mean_stress_by_strain = coo_matrix(comm, (nodes, nodes), (1, 1), step.mean_stress_by_strain_places())
+            self._mean_stress = coo_matrix(comm, (means, dofs), (1, n), step.mean_stress_places())
+            self._mean_stress_by_strain = coo_matrix(comm, (means, means), (1, 1), step.mean_stress_by_strain_places())
         self._prefix = prefix
         coupled = n > dim
         splits = coupled and PETSc.Options(prefix).getString("pc_type", "") == "fieldsplit"
@@ -102,7 +102,7 @@ class Tangent:
             self._ksp.setUp()
 
     def by_displacement(self, by_strain: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rows by the nodes' averaged volumetric strains, (k, nodes of this rank), as rows by displacements, (k, unknowns)."""
+        """Rows by the nodes' averaged volumetric strains, (k, means of this rank), as rows by displacements, (k, unknowns)."""
         if not self._averaged:
             return np.zeros((len(by_strain), self.matrix.getLocalSize()[0]))
         rows = []

@@ -221,7 +221,7 @@ class PoreWater(Conditions):
             InputError: on all ranks, for a model without water.
         """
         self._require_water()
-        return self._core.averaged_pressures()
+        return self._core.averaged_over_nodes(self.particles.pore_pressure)
 
     def saturate(self) -> None:
         """Give particles the saturation of their pressures, and the mass of the water that they then have.

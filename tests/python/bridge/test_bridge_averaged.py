@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bridge_cases import CLAY, MESHES, POISSON, YOUNG, clay_block, column, slope_model, slope_particles
-from dolfinx.mesh import meshtags
+from dolfinx.mesh import compute_midpoints, meshtags
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -53,6 +53,39 @@ def test_a_uniform_pressure_is_in_equilibrium_where_soils_of_different_averages_
     x = kinematics._space.tabulate_dof_coordinates()[:, :dim]
     inside = ((x > x.min(axis=0) + 1e-9) & (x < x.max(axis=0) - 1e-9)).all(axis=1)
     assert inside.any() and np.abs(forces[inside]).max() < 1e-12 * np.abs(forces).max()
+
+
+def layers(rows, young):
+    """(settlement, mean stress of the soil over its exact one by row of cells from below) of soil on soil under its weight.
+
+    young: Young's moduli of the lower and the upper half [Pa].
+    """
+    height, weight, poisson = 1.0, 20e3, 0.3
+    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (0.25, height), (rows // 4, rows))
+    middle = compute_midpoints(domain, 2, np.arange(len(domain.geometry.dofmap.array) // 3, dtype=np.int32))[:, 1]
+    tags = meshtags(domain, 2, np.arange(len(middle), dtype=np.int32), (middle > height / 2).astype(np.int32))
+    laws = {k: mpm.LinearElastic(young=e, poisson=poisson) for k, e in enumerate(young)}
+    supports = [bridge.roller(1, (1, 0)), bridge.roller(2, (1, 0)), bridge.fixed(3)]
+    model = bridge.QuasiStatic(domain, laws, facet_tags, supports, degree=1, nmd=True, cell_tags=tags)
+    model.solve(bridge.Load(unit_weight=weight))
+    vertical = -weight * (height - middle)
+    ratio = model.points.stress[:, :3].mean(axis=1) / (vertical * (1 + poisson) / (3 * (1 - poisson)))
+    row = (middle * rows / height).astype(int)
+    return -model.displacement.x.array.min(), np.bincount(row, ratio) / np.bincount(row)
+
+
+@pytest.mark.parametrize("young", [(20e6, 2e6), (2e6, 20e6)], ids=["soft on stiff", "stiff on soft"])
+def test_strains_of_soft_soil_are_no_stresses_of_the_stiff_soil_beside_it(young):
+    """Means over both gave the nearest row of the stiff soil 2.5 times its stress, and an error of first order."""
+    height, weight = 1.0, 20e3
+    oedometer = np.array(young) * 0.7 / (1.3 * 0.4)
+    exact = weight * height**2 / 8 * (3 / oedometer[0] + 1 / oedometer[1])
+    errors = []
+    for rows in (8, 16):
+        settlement, ratio = layers(rows, young)
+        assert ratio[rows // 2 - 2 : rows // 2 + 2] == pytest.approx(1.0, abs=0.06)
+        errors.append(abs(settlement / exact - 1))
+    assert errors[0] < 0.01 and errors[1] < 0.3 * errors[0]
 
 
 def embankment(degree):
@@ -250,11 +283,16 @@ def test_quadratic_elements_are_not_averaged():
 SAND = {"young": 1e6, "poisson": 0.3, "cohesion": 6e3, "friction_angle": 20.0, "dilation_angle": 0.0}
 
 
-@pytest.mark.parametrize("soil", [CLAY, SAND], ids=["clay", "sand"])
+@pytest.mark.parametrize(
+    "soil, below",
+    [(CLAY, CLAY), (SAND, SAND), (CLAY, SAND | {"young": 20e6})],
+    ids=["clay", "sand", "clay on stiff sand"],
+)
 @pytest.mark.parametrize("geometry", [mpm.Geometry.PLANE_STRAIN, mpm.Geometry.AXISYMMETRIC, mpm.Geometry.SOLID])
-def test_averaged_elements_go_on_as_averaged_particles_in_equilibrium(geometry, soil):
+def test_averaged_elements_go_on_as_averaged_particles_in_equilibrium(geometry, soil, below):
     """The forces of the hand-over are those of the steps that follow: they are in balance, and nothing moves."""
-    fem, model = clay_block(geometry, law=mpm.MohrCoulomb(**soil), as_particles=True)
+    laws = {"law": mpm.MohrCoulomb(**soil), "below": mpm.MohrCoulomb(**below)}
+    fem, model = clay_block(geometry, **laws, as_particles=True)
     assert bridge.initialise(model, fem, count_displacement=False, equilibrate=False).unbalanced_ratio < 1e-9
     assert model.out_of_balance() > 1e-3  # of forces that the steps do not have
     report = model.explicit(0.02, nmd=True, courant=0.25).last()
