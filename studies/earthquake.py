@@ -150,7 +150,7 @@ def shaken(a: Namespace, model: mpm.Model, until: float, folder: Path) -> tuple[
 def frame_at(model: mpm.Model, time: float) -> dict | None:
     """Gather all rows to the first rank, None on the others; resting cells are at their present places. Collective."""
     p = model.particles
-    frame = own_frame(model, time)
+    frame = own_frame(model, time, averaged=True)
     frame["position"] = np.where(p.is_resting[:, None], p.position + p.displacement, p.position).astype(np.float32)
     corners = model.mesh.points[model.mesh.cells[p.cell]].reshape(-1, 6).astype(np.float32)
     return gathered(model.comm, {**frame, "resting": p.is_resting.astype(np.float32), "corners": corners})

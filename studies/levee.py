@@ -115,17 +115,20 @@ class Followed:
         self._ground = near(0.25 * a.beside, 0.0, "sand")
         self._toes = near(left, 0.0, "sand"), near(right, 0.0, "sand")
         self._sand = [near(x, depth, "sand") for x in (0.25 * a.beside, left, middle)]
-        self._start = [self._pressure(numbers) for numbers in self._sand]
+        self._start = self._pressures()
 
-    def _pressure(self, numbers: np.ndarray) -> float:
-        rows = np.isin(self._model.particles.id, numbers)
-        total, count = comm.allreduce(np.array([effective_pressure(self._model)[rows].sum(), rows.sum()]))
-        return float(total / count)
+    def _pressures(self) -> list[float]:
+        pressure, means = effective_pressure(self._model), []
+        for numbers in self._sand:
+            rows = np.isin(self._model.particles.id, numbers)
+            total, count = comm.allreduce(np.array([pressure[rows].sum(), rows.sum()]))
+            means.append(float(total / count))
+        return means
 
     def row(self, time: float) -> dict[str, float]:
         """Values of the columns."""
         left, right = (mean_displacement(self._model, toe)[0] for toe in self._toes)
-        ratios = [1 - self._pressure(numbers) / start for numbers, start in zip(self._sand, self._start)]
+        ratios = [1 - now / start for now, start in zip(self._pressures(), self._start)]
         crest, ground = (-mean_displacement(self._model, numbers)[1] for numbers in (self._crest, self._ground))
         return dict(zip(COLUMNS, (time, crest, ground, right - left, *ratios)))
 
@@ -156,7 +159,7 @@ def shaken(a: Namespace, model: mpm.Model, until: float, folder: Path) -> tuple[
 def frame_at(model: mpm.Model, start: np.ndarray, time: float) -> dict | None:
     """Gather all rows to the first rank, None on the others; cells are at their present places. Collective."""
     p = model.particles
-    frame = own_frame(model, time)
+    frame = own_frame(model, time, averaged=True)
     frame["position"] = (p.position + p.displacement).astype(np.float32)
     corners = model.mesh.points[model.mesh.cells[p.cell]].reshape(-1, 6) + np.tile(p.displacement, 3)
     ratio = np.where(p.material == len(SOILS), np.clip(1 - effective_pressure(model) / start, 0.0, 1.0), 0.0)

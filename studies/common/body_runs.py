@@ -120,7 +120,7 @@ def follow(
             files.write()
             for probe in probes:
                 probe.record()
-            kept.append(own_frame(model, report.time, averaged=a.nmd and model.has_water))
+            kept.append(own_frame(model, report.time, averaged=a.nmd))
             progress.show(report.time, report.steps, **{shown: f"{history[shown][-1]:.4g}"})
 
         def between_steps() -> bool:

@@ -129,6 +129,6 @@ def damping_of(a: Namespace) -> mpm.Rayleigh:
 
 
 def effective_pressure(model: mpm.Model) -> np.ndarray:
-    """Mean effective stress p' of the rows of this rank [Pa], compression positive."""
+    """Mean effective stress p' of the rows of this rank [Pa], compression positive, averaged over nodes. Collective."""
     pressure = -model.particles.stress[:, :3].mean(axis=1)
-    return pressure if model.has_water else pressure - model.state("excess_pore_pressure")
+    return model.average_over_nodes(pressure if model.has_water else pressure - model.state("excess_pore_pressure"))

@@ -61,14 +61,15 @@ def own_frame(model: mpm.Model, time: float, averaged: bool = False) -> dict[str
     """The particles of a plane model on this rank as they are, and all rigid surfaces. Collective.
 
     Args:
-        averaged: whether pore pressures are those that act where an explicit run averages volumetric strains.
+        averaged: whether pore pressures are averaged over nodes, as those that act where a run averages volumetric strains.
     """
-    pressures = {"pore_pressure": model.averaged_pore_pressure().astype(np.float32)} if averaged else {}
+    acting = model.average_over_nodes if averaged else np.asarray
     # Plastic strain, because elastic oscillations during a long creep add up in the total.
     p = model.particles.single("volume", "id", "displacement", "velocity", "stress", "plastic_strain")
-    pore = {PORE: model.state(PORE).astype(np.float32)} if has_pore_pressure(model) else {}
+    pore = {PORE: acting(model.state(PORE)).astype(np.float32)} if has_pore_pressure(model) else {}
     if model.has_water:
-        pore |= model.particles.single(*WET_QUANTITIES) | pressures
+        pore |= model.particles.single(*WET_QUANTITIES)
+        pore["pore_pressure"] = acting(model.particles.pore_pressure).astype(np.float32)
         del pore["position"]
     area = p["volume"]
     if model.geometry == mpm.Geometry.AXISYMMETRIC:

@@ -193,3 +193,18 @@ def test_all_ranks_find_the_same_critical_cell():
     alone = block(MPI.COMM_SELF, (0.0, 0.0))
     assert found.number in alone.particles.cell
     np.testing.assert_allclose(alone.mesh.points[alone.mesh.cells[found.number]].mean(axis=0), found.centre)
+
+
+@pytest.mark.parametrize("owners_of", [bands, scattered, one_does_all])
+def test_averages_over_nodes_are_the_same_on_any_partition(comm, owners_of):
+    found, laws = [], [mpm.LinearElastic(young=e, poisson=0.3) for e in (4e6, 40e6)]
+    for model in (sliding_slope(comm, owners_of, laws=laws), sliding_slope(MPI.COMM_SELF, laws=laws)):
+        p = model.particles
+        model.assign((p.position[:, 1] < 0.2).astype(np.int32))
+        averaged = model.average_over_nodes(np.sin(50 * p.position))
+        parts = model.comm.allgather((p.id, averaged))
+        order = np.argsort(np.concatenate([ids for ids, _ in parts]))
+        found.append(np.concatenate([values for _, values in parts])[order])
+    assert found[0] == pytest.approx(found[1], abs=1e-13) and np.abs(found[1]).max() > 0.1
+    with pytest.raises(mpm.InputError, match="values have shape"):
+        model.average_over_nodes([1.0])

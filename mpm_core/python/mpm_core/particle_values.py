@@ -130,6 +130,45 @@ class ParticleValues:
             )
         self.particles.set("state", collectively(self.comm, checked))
 
+    def average_over_nodes(self, values: ArrayLike) -> NDArray[np.float64]:
+        """Average values of the particles over nodes as nodal mixed discretisation (``nmd=True``) averages strains. Collective.
+
+        Mean stresses and pore pressures of such runs may alternate from cell to cell, which does no work and moves nothing.
+        Average them before you use them as results. Means are weighted by volumes, over the cells around a node and back over
+        the nodes of a cell, in each soil and velocity field by itself (Detournay and Dzik 2006, docs/guide/theory.md).
+
+        Args:
+            values: of the particles of this rank in the order of ``particles``, shape (n,) or (n, k).
+
+        Returns:
+            Averages of the same shape and unit; the same for all particles of a soil in a cell.
+
+        Raises:
+            InputError: on all ranks, for another shape, or values that are not finite.
+
+        Example:
+            >>> mean_stress = model.average_over_nodes(model.particles.stress[:, :3].mean(axis=1))
+        """
+
+        def checked() -> NDArray[np.float64]:
+            array, n = real_numbers("values", values), len(self.particles)
+            if array.ndim not in (1, 2) or len(array) != n:
+                raise InputError(
+                    f"values have shape {array.shape}, expected ({n},) or ({n}, k), in the order of the particles"
+                )
+            if not np.isfinite(array).all():
+                raise InputError("values contain numbers that are not finite, expected finite ones")
+            return array
+
+        given = collectively(self.comm, checked)
+        widths = set(self.comm.allgather(given.shape[1:]))
+        if len(widths) > 1:
+            raise InputError(f"values have {widths} components on different ranks, expected as many on all of them")
+        if given.ndim == 1:
+            return self._core.averaged_over_nodes(given)
+        averaged = [self._core.averaged_over_nodes(np.ascontiguousarray(one)) for one in given.T]
+        return np.array(averaged).reshape(given.shape[::-1]).T
+
     def _state_columns(self, name: str) -> list[tuple[int, int]]:
         """(number of a law, column of the state variable) for each law that has it."""
         columns = [(k, law.state_names.index(name)) for k, law in enumerate(self.laws) if name in law.state_names]

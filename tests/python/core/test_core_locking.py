@@ -82,3 +82,76 @@ def test_a_uniform_pressure_is_in_equilibrium_where_soils_of_different_averages_
     # A pressure on the sides of a cell gives its nodes this velocity in the step, in the order of magnitude.
     scale = 1e-4 * pressure / (2000.0 * 0.25)
     assert np.abs(model.particles.velocity).max() < 1e-10 * scale
+
+
+def test_soils_are_averaged_together_while_their_stiffness_is_alike():
+    moduli = [1.2e6, 3e6, 1e6, 3.7e6, 1.24e6, 3e8]  # within a factor of 1.25 of the softest of a group
+    laws = [mpm.LinearElastic(young=young, poisson=0.3) for young in moduli]
+    assert _core.stiffness_groups(laws) == [0, 1, 0, 1, 0, 2]
+    # The water makes undrained soils alike, of whatever skeleton.
+    undrained = [mpm.Undrained(law, water_modulus=2e9, porosity=0.4) for law in laws[:4]]
+    assert _core.stiffness_groups(undrained) == [0] * 4
+    assert _core.stiffness_groups([]) == []
+
+
+@pytest.mark.parametrize("integration", [mpm.Integration.PARTICLES, mpm.Integration.MIXED])
+@pytest.mark.parametrize("dim", DIMS)
+def test_strains_of_soft_soil_are_no_stresses_of_the_stiff_soil_beside_it(dim, integration):
+    """A column of two soils is compressed: uniform strains in each, by equilibrium in proportion to 1 / E_oed."""
+    young, height, rows = (20e6, 2e6), 1.0, 8
+    mesh = box([2] * (dim - 1) + [rows], [0.25] * (dim - 1) + [height], body=([-1.0] * dim, [2.0] * (dim - 1) + [0.5]))
+    model = mpm.Model(mesh, [mpm.LinearElastic(young=e, poisson=0.3) for e in young])
+    for material, tag in enumerate((1, 0)):
+        model.seed(density=2000.0, per_cell={2: 3, 3: 4}[dim], cell_tag=tag, material=material)
+    for axis in range(dim - 1):
+        for end in (1, 2):
+            model.roller(2 * axis + end, np.eye(dim)[axis])
+    model.fix(2 * dim - 1)
+    model.prescribe(2 * dim, [0.0] * (dim - 1) + [-1e-3])
+    model.implicit(1.0, dt=1.0, quasi_static=True, small_displacements=True, nmd=True, integration=integration).last()
+    oedometer = np.array(young) * 0.7 / (1.3 * 0.4)
+    expected = -1e-3 / (0.5 * height * (1 / oedometer).sum())
+    assert np.allclose(model.particles.stress[:, dim - 1], expected, rtol=1e-6)
+
+
+def block_of_two_soils(dim):
+    mesh = box([4] * dim, shake=0.15, body=([-1.0] * dim, [2.0] * (dim - 1) + [0.5]))
+    model = mpm.Model(mesh, [mpm.LinearElastic(young=e, poisson=0.3) for e in (20e6, 2e6)])
+    for material, tag in enumerate((1, 0)):
+        model.seed(density=2000.0, per_cell={2: 3, 3: 4}[dim], cell_tag=tag, material=material)
+    return model
+
+
+@pytest.mark.parametrize("dim", DIMS)
+def test_values_of_particles_are_averaged_over_nodes_in_each_soil_by_itself(dim):
+    model = block_of_two_soils(dim)
+    p = model.particles
+    values = np.random.default_rng(2).normal(size=(len(p), 2))
+    # By the definition: means by volume of the cells of a soil around a node, and the mean of a cell's nodes.
+    expected = np.empty_like(values)
+    for soil in (0, 1):
+        own = p.material == soil
+        cells = model.mesh.cells[p.cell[own]]
+        sums, volumes = np.zeros((len(model.mesh.points), 2)), np.zeros(len(model.mesh.points))
+        for corner in cells.T:
+            np.add.at(sums, corner, p.volume[own, None] * values[own])
+            np.add.at(volumes, corner, p.volume[own])
+        expected[own] = (sums / np.maximum(volumes, 1e-300)[:, None])[cells].mean(axis=1)
+    averaged = model.average_over_nodes(values)
+    assert averaged == pytest.approx(expected, rel=1e-12, abs=1e-14)
+    assert np.array_equal(model.average_over_nodes(values[:, 0]), averaged[:, 0])
+    assert p.volume @ averaged == pytest.approx(p.volume @ values, rel=1e-10)
+    assert model.average_over_nodes(np.where(p.material == 0, 3.0, -7.0)) == pytest.approx(
+        np.where(p.material == 0, 3.0, -7.0)
+    )
+
+
+@pytest.mark.parametrize(
+    "values, said",
+    [([1.0, 2.0], "shape"), (np.nan, "not finite"), ("text", "real numbers")],
+)
+def test_values_that_cannot_be_averaged_are_refused(values, said):
+    model = block_of_two_soils(2)
+    given = np.full(len(model.particles), values) if np.isscalar(values) else values
+    with pytest.raises(mpm.InputError, match=f"(?s)values.*{said}"):
+        model.average_over_nodes(given)
