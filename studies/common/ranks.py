@@ -18,6 +18,7 @@ from mpi4py import MPI
 from mpm_core import InputError, RunError
 
 from .files import NOT_WRITTEN, PROGRAM, OutputError
+from .option_words import in_options
 
 
 def end_all_on_error(comm: MPI.Comm = MPI.COMM_WORLD) -> None:
@@ -73,7 +74,9 @@ def run_study(main: Callable[[], int], *expected: type[BaseException]) -> NoRetu
     name = script.parent.name if script.stem == "__main__" else script.stem
     end_all_on_error(comm)
     outlive_readers()
-    warnings.formatwarning = lambda text, *_, **__: f"warning: {text}\n"  # where in the source does not help a user
+    parser_of_study = getattr(sys.modules[main.__module__], "parser", lambda: None)
+    # The place in the source does not help a user.
+    warnings.formatwarning = lambda text, *_, **__: f"warning: {in_options(str(text), parser_of_study())}\n"
     signal.signal(signal.SIGUSR1, signal.default_int_handler)  # by which `studies/run --ranks` hands Ctrl-C on
     try:
         code = main()
@@ -82,7 +85,7 @@ def run_study(main: Callable[[], int], *expected: type[BaseException]) -> NoRetu
         sys.exit(code or (1 if NOT_WRITTEN else 0))
     except (InputError, RunError, OutputError, *expected) as error:
         if comm.rank == 0:
-            print(f"{PROGRAM} {name}: {error}", file=sys.stderr)
+            print(f"{PROGRAM} {name}: {in_options(str(error), parser_of_study())}", file=sys.stderr)
         sys.exit(2)
     except KeyboardInterrupt:
         print(f"\n{PROGRAM} {name}: interrupted", file=sys.stderr)

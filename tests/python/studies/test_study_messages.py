@@ -8,13 +8,18 @@ from argparse import Namespace
 from pathlib import Path
 
 import pytest
+from mpi4py import MPI
 
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge.fem.locking import warn_of_locking_at_failure
 from mpm_core import failure_watch
 
 STUDIES = Path(__file__).parents[3] / "studies"
 sys.path.insert(0, str(STUDIES))
 
 from common import quiet, seepage_plots  # noqa: E402
+from common.option_words import in_options  # noqa: E402
 
 
 def test_warnings_that_a_study_leaves_out_are_those_of_the_core():
@@ -61,3 +66,31 @@ def test_initial_stresses_are_described_in_a_line():
 def test_help_shows_one_default_of_an_option():
     text = " ".join(importlib.import_module("retrogression").parser().format_help().split())
     assert "length of the level crest [m] (default: 30)" in text and "1.1 times the height" not in text
+
+
+def warned_of_elements():
+    """The warning of elements of degree 1 that lock as soil fails."""
+    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_SELF, (1.0, 1.0), (1, 1))
+    law = mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1e3, friction_angle=30.0, dilation_angle=0.0)
+    model = bridge.QuasiStatic(domain, law, facet_tags, [bridge.fixed(3)], degree=1)
+    with pytest.warns(RuntimeWarning) as warned:
+        warn_of_locking_at_failure(model)
+    return str(warned[0].message)
+
+
+@pytest.mark.parametrize(
+    "study, message, said, not_said",
+    [
+        ("safety", warned_of_elements, "take --elements P1-averaged, or --elements P2", "nmd=|degree="),
+        ("slope", lambda: failure_watch.LOCKING, "Use --nmd, .* with --integration mixed", "nmd=|=MIXED"),
+        ("slope", lambda: failure_watch.GATHERING, "with --nmd and --integration particles", "nmd=|=MIXED"),
+        ("drawdown", warned_of_elements, "take --elements P2", "nmd=|degree="),
+    ],
+)
+def test_warnings_of_the_library_name_the_options_of_a_study(study, message, said, not_said):
+    text = in_options(message(), importlib.import_module(study).parser())
+    assert re.search(said, text) and not re.search(not_said, text)
+
+
+def test_a_script_without_options_says_what_the_library_says():
+    assert in_options(failure_watch.LOCKING, None) == failure_watch.LOCKING
