@@ -2,6 +2,8 @@
 
 #include "model/integration.h"
 
+#include <utility>
+
 namespace mpm::model
 {
 namespace
@@ -25,7 +27,6 @@ std::vector<double> averaged_over_nodes(Model<G>& model, std::span<const double>
   const Mesh<D>& mesh = model.mesh;
   std::vector<double> averaged(values.size());
   std::vector<VolumeMean> cells, means;
-  choose_groups(model, true);
   for (VelocityField<G>& field : model.fields)
   {
     const std::vector<Run> runs = runs_of_field(model, field);
@@ -39,8 +40,10 @@ std::vector<double> averaged_over_nodes(Model<G>& model, std::span<const double>
       cells[run.cell].volume += model.particles.volume[run.first];
     }
     const MeshPart part = make_part<D>(mesh, filled, model.exchange.shared_nodes);
+    AveragedGroups groups{field.integration.n_groups, {}};
+    std::swap(groups, field.integration.groups);
     find_averaged_groups(mesh, runs, field);
-    const AveragedGroups& groups = field.integration.groups;
+    std::swap(groups, field.integration.groups); // those of the last step stay
     average_over_nodes(
         mesh, part, groups, [&](Index c) { return cells[c].volume; }, [&](Index c, double) { return cells[c].value; },
         model.exchange, means);
