@@ -72,12 +72,9 @@ class AveragedKinematics:
         displacements, dofs = self._displacements(further is not None)
         dofs, nodes, gradients, volumes, radii = self._cells(displacements, dofs, geometry == Geometry.AXISYMMETRIC)
         n_own = self._n_dofs, displacements.dofmap.index_map.size_local
-        by_law = np.array(_core.stiffness_groups(list(laws)))
-        present, groups = points.material >= 0, by_law[np.maximum(points.material, 0)]
-        self._strain = AveragedStrain(
-            self._space.mesh.comm, n_own, dofs, nodes, gradients, volumes, radii, present, groups, by_law.max() + 1
-        )
-        self._assembled = AssembledStiffness(self._strain) if assembled else None
+        self._cells_of_strain = n_own, dofs, nodes, gradients, volumes, radii
+        self._is_assembled = assembled
+        self._groups: list[int] = []
         self._without = None if assembled else Kinematics(increment, points, constraints, geometry)
         self._more: tuple[Any, Stiffness] | None = None
         if further is not None:
@@ -90,17 +87,33 @@ class AveragedKinematics:
         self.follow(laws)
 
     def follow(self, laws: Sequence[Law]) -> None:
-        """Average as the laws ask for: forces of soil that dilates less than associated flow by less. Collective.
+        """Average as the laws ask for: soils of unlike stiffness apart, forces of soil that dilates little by less. Collective.
 
         Args:
             laws: the laws, by number.
         """
         number = np.maximum(self._points.material, 0)
+        self._group(_core.stiffness_groups(list(laws)), number)
         if self._as_particles:
             fractions = np.array([_core.fraction_of_averages(law) for law in laws])[number]
             self._strain.of_strains = self._strain.of_forces = fractions
         else:
             self._strain.of_forces = np.array([_core.fraction_of_averaged_forces(law) for law in laws])[number]
+
+    def _group(self, groups: list[int], number: NDArray[np.integer]) -> None:
+        """Average the soils of each group by themselves. Collective.
+
+        Args:
+            groups: number of the group of each law.
+            number: number of the law of each cell.
+        """
+        if groups == self._groups:
+            return
+        self._groups = groups
+        comm, present = self._space.mesh.comm, self._points.material >= 0
+        of_cells = np.array(groups)[number]
+        self._strain = AveragedStrain(comm, *self._cells_of_strain, present, of_cells, max(groups) + 1)
+        self._assembled = AssembledStiffness(self._strain) if self._is_assembled else None
 
     def strain_increment(self) -> NDArray[np.float64]:
         """Averaged strain of the increment in each cell: (n, S)."""

@@ -29,7 +29,7 @@ class AssembledStiffness:
         self._of_normal = part
         self._divergence = part.copy().transpose().matMult(strain.plain)
         self._divergence.scale(strain.normal)
-        self._around_nodes = strain.mean_of_nodes.transpose(PETSc.Mat())
+        self._around_nodes = strain.mean_of_vertices.transpose(PETSc.Mat())
         components = size * (first + np.arange(n))[:, None] + np.arange(size)
         self._columns = np.repeat(components, size, axis=0)
         self._tangent = matrix(self._comm, (n * size, n * size), self._columns, 1.0)
@@ -77,7 +77,7 @@ class AssembledStiffness:
         volumes, per_volume = strain.weights(fractions)
         around.diagonalScale(L=_vector(around.createVecLeft(), per_volume), R=_vector(around.createVecRight(), volumes))
         around.scale(strain.corners)
-        change = strain.mean_of_nodes.matMult(around.matMult(self._divergence))
+        change = strain.mean_of_vertices.matMult(around.matMult(self._divergence))
         change.axpy(-1.0, self._divergence)
         change.diagonalScale(L=_vector(change.createVecLeft(), fractions))
         operator = self._of_normal.matMult(change)

@@ -60,13 +60,13 @@ class AveragedStrain:
         self.plain = matrix(comm, (n * self.size, n_dofs), columns, rows)
         """The plain strain"""
         means = nodes * n_groups + groups[:, None]
-        self.mean_of_nodes = matrix(comm, (n, n_nodes * n_groups), means, 1 / corners)
-        """The mean over a cell's nodes, of the values that its group has there"""
+        self.mean_of_vertices = matrix(comm, (n, n_nodes * n_groups), means, 1 / corners)
+        """The mean over a cell's vertices, of the values that its group has there"""
         self._present, self.corners = present, corners
-        self._strain_of, self._over_nodes = _Product(self.plain), _Product(self.mean_of_nodes)
+        self._strain_of, self._over_nodes = _Product(self.plain), _Product(self.mean_of_vertices)
         # Products with PETSc's own transposes would add up what ranks send in the order in which it arrives.
         self._forces_of = _Product(self.plain.transpose(PETSc.Mat()))
-        self._to_nodes = _Product(self.mean_of_nodes.transpose(PETSc.Mat()))
+        self._to_nodes = _Product(self.mean_of_vertices.transpose(PETSc.Mat()))
 
     def weights(self, fractions: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Weights of the means over the cells around a node: the volume of each cell in its own, and one over the sum of each mean.

@@ -51,6 +51,13 @@ void volumetric_strain_entries(const Mesh<D>& mesh, const VelocityField<G>& fiel
           block[b] += weight * change[b];
       }
     }
+  // Places for the ghost penalty between cells of different groups, which have no mean in common.
+  for (int group = 0; system.groups.count > 1 && group < system.groups.count; ++group)
+    for (const auto [first, second] : system.ghosts)
+    {
+      sum.next(first * system.groups.count + group, second);
+      sum.next(second * system.groups.count + group, first);
+    }
 }
 
 template <class G, int D>

@@ -252,8 +252,7 @@ void differentiate(Model<G>& model, ImplicitStep<G>& step)
       bodies.block[k * (n + 1)] += driven.mass / (step.dt * step.dt);
     sum_shared(model.exchange, driven.column);
     sum_shared(model.exchange, driven.row);
-    for (std::size_t group = 0; group < groups; ++group)
-      sum_shared(model.exchange, driven.row_by_strain.data() + group * nodes, 1);
+    sum_shared(model.exchange, driven.row_by_strain.data(), static_cast<int>(groups));
   }
 }
 } // namespace

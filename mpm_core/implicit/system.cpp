@@ -40,8 +40,10 @@ void number_means(const AveragedGroups& groups, ImplicitSystem<D>& system)
 {
   system.groups = groups;
   system.number_of_mean.clear();
-  for (int group = 0; groups.count > 1 && group < groups.count; ++group)
-    for (const GlobalIndex number : system.number)
+  if (groups.count == 1)
+    return;
+  for (const GlobalIndex number : system.number)
+    for (int group = 0; group < groups.count; ++group)
       system.number_of_mean.push_back(number == none ? none : groups.count * number + group);
 }
 
@@ -91,7 +93,8 @@ bool number_nodes(NodeExchange& exchange, const VelocityField<G>& field, const I
   for (const GhostFacet<D>& facet : step.ghosts)
     ghosts.push_back({facet.nodes[D], facet.nodes[D + 1]});
   int changed = owned != system.owned || step.cells != system.cells || ghosts != system.ghosts ||
-                step.has_contacts != system.has_contacts || field.integration.groups.of_cell != system.groups.of_cell;
+                step.has_contacts != system.has_contacts || field.integration.groups.of_cell != system.groups.of_cell ||
+                field.integration.groups.count != system.groups.count;
   MPI_Allreduce(MPI_IN_PLACE, &changed, 1, MPI_INT, MPI_MAX, exchange.comm);
 
   system.unknowns = step.pore.flows ? D + 1 : D;

@@ -2,8 +2,6 @@
 
 #include "model/integration.h"
 
-#include <utility>
-
 namespace mpm::model
 {
 namespace
@@ -27,7 +25,7 @@ std::vector<double> averaged_over_nodes(Model<G>& model, std::span<const double>
   const Mesh<D>& mesh = model.mesh;
   std::vector<double> averaged(values.size());
   std::vector<VolumeMean> cells, means;
-  for (VelocityField<G>& field : model.fields)
+  for (const VelocityField<G>& field : model.fields)
   {
     const std::vector<Run> runs = runs_of_field(model, field);
     cells.assign(static_cast<std::size_t>(mesh.owned_cells), {});
@@ -40,10 +38,8 @@ std::vector<double> averaged_over_nodes(Model<G>& model, std::span<const double>
       cells[run.cell].volume += model.particles.volume[run.first];
     }
     const MeshPart part = make_part<D>(mesh, filled, model.exchange.shared_nodes);
-    AveragedGroups groups{field.integration.n_groups, {}};
-    std::swap(groups, field.integration.groups);
-    find_averaged_groups(mesh, runs, field);
-    std::swap(groups, field.integration.groups); // those of the last step stay
+    const AveragedGroups groups =
+        averaged_groups(mesh, {runs}, field.integration.group_by_law, field.integration.n_groups);
     average_over_nodes(
         mesh, part, groups, [&](Index c) { return cells[c].volume; }, [&](Index c, double) { return cells[c].value; },
         model.exchange, means);

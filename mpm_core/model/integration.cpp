@@ -111,27 +111,51 @@ void group_soils(Model<G>& model)
   }
 }
 
-template <class G, int D>
-void find_averaged_groups(const Mesh<D>& mesh, const std::vector<Run>& runs, VelocityField<G>& field)
+template <int D>
+AveragedGroups averaged_groups(const Mesh<D>& mesh, std::initializer_list<std::span<const Run>> runs,
+                               const std::vector<int>& group_by_law, int count)
 {
-  AveragedGroups& groups = field.integration.groups;
-  groups.of_cell.clear();
-  if (groups.count == 1)
-    return;
-  const auto count = static_cast<std::size_t>(groups.count);
-  auto& particles = field.integration.particles_of_group;
-  particles.assign(count * static_cast<std::size_t>(mesh.owned_cells), 0);
-  for (const std::span<const Run> each : {std::span(runs), std::span(std::as_const(field.resting.runs))})
-    for (const Run& run : each)
-      if (const int group = field.integration.group_by_law[run.material]; group >= 0)
-        particles[count * static_cast<std::size_t>(run.cell) + static_cast<std::size_t>(group)] += run.last - run.first;
-  groups.of_cell.resize(static_cast<std::size_t>(mesh.owned_cells));
-  for (std::size_t c = 0; c < groups.of_cell.size(); ++c)
+  AveragedGroups groups{count, {}};
+  if (count == 1)
+    return groups;
+  groups.of_cell.assign(static_cast<std::size_t>(mesh.owned_cells), none);
+  std::vector<Index> mixed; // cells of several groups, which are few
+  const auto for_each_run = [&](auto&& work)
   {
-    const auto first = particles.begin() + static_cast<std::ptrdiff_t>(count * c);
-    const auto most = std::max_element(first, first + static_cast<std::ptrdiff_t>(count));
-    groups.of_cell[c] = static_cast<Index>(most - first);
+    for (const std::span<const Run> each : runs)
+      for (const Run& run : each)
+        if (const int group = group_by_law[run.material]; group >= 0)
+          work(run, group);
+  };
+  for_each_run(
+      [&](const Run& run, int group)
+      {
+        Index& of_cell = groups.of_cell[run.cell];
+        if (of_cell != none && of_cell != group)
+          mixed.push_back(run.cell);
+        of_cell = group;
+      });
+  for (Index& of_cell : groups.of_cell)
+    of_cell = std::max(of_cell, 0); // of empty cells
+  if (mixed.empty())
+    return groups;
+  std::ranges::sort(mixed);
+  const auto repeated = std::ranges::unique(mixed);
+  mixed.erase(repeated.begin(), repeated.end());
+  std::vector<Index> particles(mixed.size() * static_cast<std::size_t>(count));
+  for_each_run(
+      [&](const Run& run, int group)
+      {
+        const auto place = std::ranges::lower_bound(mixed, run.cell);
+        if (place != mixed.end() && *place == run.cell)
+          particles[static_cast<std::size_t>((place - mixed.begin()) * count + group)] += run.last - run.first;
+      });
+  for (std::size_t k = 0; k < mixed.size(); ++k)
+  {
+    const auto first = particles.begin() + static_cast<std::ptrdiff_t>(k) * count;
+    groups.of_cell[mixed[k]] = static_cast<Index>(std::max_element(first, first + count) - first);
   }
+  return groups;
 }
 
 template <class G, int D>
@@ -196,7 +220,6 @@ Matrix<G::dim> dual_gradient(const Mesh<G::dim>& mesh, const VelocityField<G>& f
 #define INSTANTIATE(G)                                                                                                 \
   template Working<G> full_cell_stress(const Mesh<G::dim>&, const VelocityField<G>&, Index);                           \
   template void group_soils(Model<G>&);                                                                                \
-  template void find_averaged_groups(const Mesh<G::dim>&, const std::vector<Run>&, VelocityField<G>&);                 \
   template void begin_integration(const Mesh<G::dim>&, NodeExchange&, const Particles<G::dim>&,                        \
                                   const std::vector<Run>&, VelocityField<G>&);                                         \
   template void average_gradients(const Mesh<G::dim>&, NodeExchange&, VelocityField<G>&);                              \
@@ -204,4 +227,10 @@ Matrix<G::dim> dual_gradient(const Mesh<G::dim>& mesh, const VelocityField<G>& f
 INSTANTIATE(PlaneStrain)
 INSTANTIATE(Axisymmetric)
 INSTANTIATE(Solid)
+#undef INSTANTIATE
+#define INSTANTIATE(D)                                                                                                 \
+  template AveragedGroups averaged_groups(const Mesh<D>&, std::initializer_list<std::span<const Run>>,                 \
+                                          const std::vector<int>&, int);
+INSTANTIATE(2)
+INSTANTIATE(3)
 } // namespace mpm::model

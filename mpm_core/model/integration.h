@@ -4,6 +4,8 @@
 
 #include "model/model.h"
 
+#include <initializer_list>
+
 namespace mpm::model
 {
 /// A cell is full when its particles fill this fraction of its volume (Al-Kafaji 2013, Formulation of a dynamic
@@ -84,10 +86,13 @@ inline void choose_groups(Model<G>& model, bool averages)
     field.integration.groups.count = averages ? field.integration.n_groups : 1;
 }
 
-/// Finds the group in which each cell is averaged in this step: that of the most of its particles, of the softer soil
-/// where two have as many.
-template <class G, int D = G::dim>
-void find_averaged_groups(const Mesh<D>& mesh, const std::vector<Run>& runs, VelocityField<G>& field);
+/// The group in which each cell is averaged: that of the most of its particles, of the softer soil where two have as
+/// many.
+/// @param runs          of the particles, and of the rows of resting cells
+/// @param group_by_law  negative outside of the field
+template <int D>
+AveragedGroups averaged_groups(const Mesh<D>& mesh, std::initializer_list<std::span<const Run>> runs,
+                               const std::vector<int>& group_by_law, int count);
 
 /// Finds what the cells integrate in this step, where it is not the sum over their particles: a full cell integrates
 /// the mean stress of its particles over its volume (mixed), or the mean stress by the weights of dual domains.

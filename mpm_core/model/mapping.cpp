@@ -133,8 +133,10 @@ void particles_to_nodes(const Mesh<D>& mesh, NodeExchange& exchange, const Parti
   if (std::exchange(field.part_shrinks, false))
     shrink_part(mesh, exchange, field);
   begin_integration(mesh, exchange, particles, runs, field);
-  if (!field.integration.given)
-    find_averaged_groups(mesh, runs, field);
+  CellIntegration<D>& integration = field.integration;
+  if (!integration.given)
+    integration.groups =
+        averaged_groups(mesh, {runs, field.resting.runs}, integration.group_by_law, integration.groups.count);
   const auto integrated = [&](Index c) { return integrated_stress(mesh, field, c); };
   const auto scatter_particles = [&](auto&& stress_of, std::span<const NodeSums<D>> of_resting_cells)
   {

@@ -1,5 +1,6 @@
 #include "model/rebalance.h"
 
+#include "model/integration.h"
 #include "model/mapping.h"
 #include "model/moving_cells.h"
 #include "parallel/redistribution.h"
@@ -23,6 +24,7 @@ void set_partition(Model<G>& model, const Mesh<D>& mesh, std::span<const GlobalI
   redistribute<D>(mesh, model.exchange, cells, ranks, model.particles);
   for (VelocityField<G>& field : model.fields)
     field = {};
+  group_soils(model);
   for (Contact<D>& contact : model.contacts)
     contact.bounds.clear(); // of cells that have other numbers now
   for (FieldContact<D>& contact : model.field_contacts)

@@ -63,7 +63,6 @@ struct CellIntegration
   bool given = false;                   ///< whether the fractions and groups of cells are those of another field
   std::vector<RelaxingCell<D>> relaxing;       ///< per owned cell, in explicit steps of undrained soil; else empty
   std::vector<NodeMass> masses;                ///< scratch, per node
-  std::vector<Index> particles_of_group;       ///< scratch, per owned cell and group
   std::vector<VolumeMean> mean_stress_of_cell; ///< scratch: integral and volume
   std::vector<std::array<double, 2>> fills;    ///< per node: volumes of particles and of cells around it
   std::vector<unsigned char> whole; ///< per owned cell, at the step's start: 1 where full; not with particles
@@ -105,7 +104,7 @@ struct VelocityField
   std::vector<Vector<D>> acceleration;       ///< a_i
   std::vector<Vector<D>> velocity_change;    ///< of the nodes, as the particles take it
   std::vector<Vector<D>> velocity;           ///< v_i that moves and strains the particles
-  std::vector<VolumeMean> volumetric_strain; ///< of the nodes, by group; empty until first used, with nodal mixed
+  std::vector<VolumeMean> volumetric_strain; ///< per node and group of soils; empty until first used, with nodal mixed
                                              ///< discretisation
   std::vector<VolumeMean> mean_stress;       ///< likewise
 };

@@ -90,7 +90,9 @@ void for_each_field(P& particles, F&& f)
   f(Field{"pressure_gradient", "Pa/m", "Gradient of the pore pressure", settable}, particles.pressure_gradient);
   f(Field{"porosity", "-", "Volume of the pores over that of the soil", settable}, particles.porosity);
   f(Field{"conductivity", "m/s", "Hydraulic conductivity", settable}, particles.conductivity);
-  f(Field{"saturation", "-", "Degree of saturation where soil may dry; it follows from the pore pressure", settable, 1},
+  f(Field{"saturation", "-",
+          "Degree of saturation where soil may dry, which follows from the pore pressure, or of moist soil", settable,
+          1},
     particles.saturation);
   f(Field{"water_velocity", "m/s", "Velocity of the pore water where it has its own, in explicit runs", settable},
     particles.water_velocity);

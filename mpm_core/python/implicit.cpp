@@ -144,11 +144,15 @@ void bind_bodies(py::class_<Implicit<G>>& bound)
                              [](const I& i)
                              {
                                std::vector<double> all;
-                               const std::size_t size = i.system.number.size();
+                               const auto groups = static_cast<std::size_t>(i.system.groups.count);
                                for (const DrivenAxis<D>& driven : i.step.bodies.axes)
-                                 for (Index node : i.system.owned) // in the order of `number_of_mean`
-                                   for (std::size_t mean = node; mean < driven.row_by_strain.size(); mean += size)
-                                     all.push_back(driven.row_by_strain[mean]);
+                                 for (Index node : i.system.owned)
+                                 {
+                                   const auto first =
+                                       driven.row_by_strain.begin() +
+                                       static_cast<std::ptrdiff_t>(groups * static_cast<std::size_t>(node));
+                                   all.insert(all.end(), first, first + static_cast<std::ptrdiff_t>(groups));
+                                 }
                                return copied(all);
                              });
 }

@@ -25,19 +25,19 @@ struct AveragedGroups
   std::vector<Index> of_cell; ///< per owned cell; empty where there is one group
 };
 
-/// Where the means of a cell's vertices are: those of one group follow those of another, in the order of the nodes.
+/// Where the means of a cell's vertices are: node by node, those of all groups of a node one after the other.
 template <int D>
 inline std::array<Index, D + 1> means_of(const Mesh<D>& mesh, const AveragedGroups& groups, Index cell)
 {
   std::array<Index, D + 1> means = mesh.cells[cell];
-  if (!groups.of_cell.empty()) [[unlikely]]
+  if (!groups.of_cell.empty())
     for (Index& mean : means)
-      mean += groups.of_cell[cell] * static_cast<Index>(mesh.points.size());
+      mean = mean * groups.count + groups.of_cell[cell];
   return means;
 }
 
 /// Sums terms of the cells of a part of the mesh at the means of their vertices, over all ranks.
-/// @param means     sums, zero before, for each group as many as the mesh has nodes
+/// @param means     sums, zero before, for each node as many as there are groups
 /// @param add_cell  calls its second argument, a callable (int vertex, const T& term), with the terms of a cell; a
 ///                  callable (Index cell, auto&& add)
 /// @note Collective
@@ -45,20 +45,26 @@ template <class T, int D, class AddCell>
 void sum_at_means(const Mesh<D>& mesh, const MeshPart& part, const AveragedGroups& groups, NodeExchange& exchange,
                   std::span<T> means, AddCell&& add_cell)
 {
-  const std::size_t size = mesh.points.size();
-  for (int group = 0; group < groups.count; ++group)
+  const int width = groups.count * static_cast<int>(sizeof(T) / sizeof(double));
+  const auto each_term = [&](auto&& add)
   {
-    const auto own = means.subspan(static_cast<std::size_t>(group) * size, size);
-    const auto each_term = [&](auto&& add)
+    for (Index c : part.cells)
     {
-      for (Index c : part.cells)
-        if (groups.of_cell.empty() || groups.of_cell[c] == group)
-          add_cell(c, [&](int k, const T& term) { add(mesh.cells[c][k], term); });
-    };
-    sum_at_nodes<T>(
-        exchange, [own](Index node) -> T& { return own[node]; }, each_term);
-    sum_shared(exchange, own);
+      const auto places = means_of(mesh, groups, c);
+      add_cell(c, [&](int k, const T& term) { add(places[k], term); });
+    }
+  };
+  if (exchange.reproducible)
+  {
+    std::vector<T> largest(means.size());
+    each_term([&largest](Index mean, const T& term) { keep_largest(term, largest[static_cast<std::size_t>(mean)]); });
+    max_shared(exchange, reinterpret_cast<double*>(largest.data()), width);
+    each_term([&](Index mean, const T& term)
+              { add_rounded(term, largest[static_cast<std::size_t>(mean)], means[static_cast<std::size_t>(mean)]); });
   }
+  else
+    each_term([means](Index mean, const T& term) { add_plainly(term, means[static_cast<std::size_t>(mean)]); });
+  sum_shared(exchange, reinterpret_cast<double*>(means.data()), width);
 }
 
 /// Means over the filled cells of each group around each node of a part of the mesh (method of Detournay & Dzik 2006;
@@ -70,13 +76,13 @@ template <int D, class VolumeOf, class IntegralOf>
 void average_over_nodes(const Mesh<D>& mesh, const MeshPart& part, const AveragedGroups& groups, VolumeOf&& volume_of,
                         IntegralOf&& integral_of, NodeExchange& exchange, std::vector<VolumeMean>& means)
 {
-  const std::size_t size = mesh.points.size(), all = static_cast<std::size_t>(groups.count) * size;
-  means.resize(all);
+  const auto count = static_cast<std::size_t>(groups.count);
+  means.resize(count * mesh.points.size());
   const auto for_each_mean = [&](auto&& work)
   {
-    for (std::size_t first = 0; first < all; first += size)
-      for (Index node : part.nodes)
-        work(means[first + static_cast<std::size_t>(node)]);
+    for (Index node : part.nodes)
+      for (std::size_t group = 0; group < count; ++group)
+        work(means[count * static_cast<std::size_t>(node) + group]);
   };
   for_each_mean([](VolumeMean& mean) { mean = {}; });
   const auto add_cell = [&](Index c, auto&& add)

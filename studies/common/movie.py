@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from mpi4py import MPI
@@ -63,7 +64,7 @@ def own_frame(model: mpm.Model, time: float, averaged: bool = False) -> dict[str
     Args:
         averaged: whether pore pressures are averaged over nodes, as those that act where a run averages volumetric strains.
     """
-    acting = model.average_over_nodes if averaged else np.asarray
+    acting = partial(averaged_where_known, model) if averaged else np.asarray
     # Plastic strain, because elastic oscillations during a long creep add up in the total.
     p = model.particles.single("volume", "id", "displacement", "velocity", "stress", "plastic_strain")
     pore = {PORE: acting(model.state(PORE)).astype(np.float32)} if has_pore_pressure(model) else {}
@@ -79,6 +80,11 @@ def own_frame(model: mpm.Model, time: float, averaged: bool = False) -> dict[str
         "displacement": np.hypot(*p["displacement"].T), "shear_strain": p["plastic_strain"],
         "vertical_stress": p["stress"][:, 1].copy(), "speed": np.hypot(*p["velocity"].T), **pore, **_bodies(model),
     }  # fmt: skip
+
+
+def averaged_where_known(model: mpm.Model, values: np.ndarray) -> np.ndarray:
+    """Values of the particles averaged over nodes; NaN, of soils that have none, stays and counts as zero. Collective."""
+    return np.where(np.isnan(values), np.nan, model.average_over_nodes(np.nan_to_num(values)))
 
 
 def _bodies(model: mpm.Model) -> dict[str, np.ndarray]:

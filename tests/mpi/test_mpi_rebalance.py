@@ -75,6 +75,28 @@ def test_an_implicit_run_that_is_rebalanced_is_the_same_run(comm):
     assert comm.size == 1 or model.repartitions > 0
 
 
+def two_soils(comm):
+    """The sliding slope, of soft soil on stiff soil that are averaged apart."""
+    laws = [mpm.MohrCoulomb(young=e, poisson=0.3, cohesion=1e3, friction_angle=25.0) for e in (4e6, 40e6)]
+    model = sliding_slope(comm, laws=laws)
+    model.assign((model.particles.position[:, 1] < 0.2).astype(np.int32))
+    return model
+
+
+def test_soils_that_are_averaged_apart_stay_so_when_they_are_rebalanced(comm, shared_path):
+    model, alone = two_soils(comm), two_soils(MPI.COMM_SELF)
+    for each, threshold in ((model, 1.05), (alone, None)):
+        each.explicit(0.2, nmd=True, rebalance=threshold).last()
+    assert comm.size == 1 or model.repartitions > 0
+    model.save(shared_path / "two_soils.h5")
+    resumed = two_soils(comm)
+    resumed.restore(shared_path / "two_soils.h5")
+    for each in (resumed, alone):
+        each.explicit(0.3, nmd=True).last()
+        each.implicit(0.34, dt=0.02, nmd=True, solver=mpm.Newton(tolerance=1e-11)).last()
+    assert_same(all_by_id(resumed), all_by_id(alone), 1e-7)
+
+
 def heap(comm):
     """A block of tetrahedra between smooth walls that slides and spreads along its smooth base."""
     mesh = spread_box((12, 3, 4), (1.2, 0.3, 0.4), comm, body=((0, 0, 0), (0.5, 0.3, 0.3)))

@@ -82,10 +82,10 @@ def slope_particles(unit_weight, cell_size=0.1, kind="crossed", law=None, comm=M
 CLAY = {"young": 1e6, "poisson": 0.45, "cohesion": 8e3, "friction_angle": 0.0}
 
 
-def clay_block(geometry, comm=MPI.COMM_WORLD, law=None, below=None, **options):
+def clay_block(geometry, comm=MPI.COMM_WORLD, law=None, below=None, more=(), **options):
     """(finite elements, particles in their cells) of clay, or another soil, that stands free on rough ground; both average strains.
 
-    below: law of the lower half; that of the upper one by default.
+    below: law of the lower half; that of the upper one by default. more: laws of the particles that none of them has.
     """
     axisymmetric = geometry == bridge.Geometry.AXISYMMETRIC
     dim = 3 if geometry == bridge.Geometry.SOLID else 2
@@ -105,7 +105,7 @@ def clay_block(geometry, comm=MPI.COMM_WORLD, law=None, below=None, **options):
     fem.solve(bridge.Load(unit_weight=18e3))
     assert fem.converged
     mesh = bridge.background_mesh(domain, tags, facet_tags)
-    model = mpm.Model(mesh, list(laws.values()), **({"geometry": geometry} if axisymmetric else {}))
+    model = mpm.Model(mesh, [*laws.values(), *more], **({"geometry": geometry} if axisymmetric else {}))
     for material, tag in enumerate(laws):
         model.seed(density=18e3 / 9.81, per_cell={3: 4, 2: 3}[dim], cell_tag=tag, material=material)
     model.roller(1, np.eye(dim)[0])

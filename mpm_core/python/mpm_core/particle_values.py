@@ -135,16 +135,17 @@ class ParticleValues:
 
         Mean stresses and pore pressures of such runs may alternate from cell to cell, which does no work and moves nothing.
         Average them before you use them as results. Means are weighted by volumes, over the cells around a node and back over
-        the nodes of a cell, in each soil and velocity field by itself (Detournay and Dzik 2006, docs/guide/theory.md).
+        the nodes of a cell, for each velocity field and the soils of like stiffness in it by themselves (Detournay and Dzik 2006,
+        docs/guide/theory.md). A cell of several soils counts with that of most of its particles.
 
         Args:
             values: of the particles of this rank in the order of ``particles``, shape (n,) or (n, k).
 
         Returns:
-            Averages of the same shape and unit; the same for all particles of a soil in a cell.
+            Averages of the same shape and unit; the same for all particles of a velocity field in a cell.
 
         Raises:
-            InputError: on all ranks, for another shape, or values that are not finite.
+            InputError: on all ranks, for another shape, or values that are not finite, such as `state` of soils without it.
 
         Example:
             >>> mean_stress = model.average_over_nodes(model.particles.stress[:, :3].mean(axis=1))

@@ -55,6 +55,12 @@ def test_a_uniform_pressure_is_in_equilibrium_where_soils_of_different_averages_
     assert inside.any() and np.abs(forces[inside]).max() < 1e-12 * np.abs(forces).max()
 
 
+def halves(domain, height):
+    """Tags of cells: 0 in the lower half, 1 in the upper one."""
+    middle = compute_midpoints(domain, 2, np.arange(len(domain.geometry.dofmap.array) // 3, dtype=np.int32))[:, 1]
+    return meshtags(domain, 2, np.arange(len(middle), dtype=np.int32), (middle > height / 2).astype(np.int32))
+
+
 def layers(rows, young):
     """(settlement, mean stress of the soil over its exact one by row of cells from below) of soil on soil under its weight.
 
@@ -62,8 +68,8 @@ def layers(rows, young):
     """
     height, weight, poisson = 1.0, 20e3, 0.3
     domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (0.25, height), (rows // 4, rows))
-    middle = compute_midpoints(domain, 2, np.arange(len(domain.geometry.dofmap.array) // 3, dtype=np.int32))[:, 1]
-    tags = meshtags(domain, 2, np.arange(len(middle), dtype=np.int32), (middle > height / 2).astype(np.int32))
+    tags = halves(domain, height)
+    middle = compute_midpoints(domain, 2, tags.indices)[:, 1]
     laws = {k: mpm.LinearElastic(young=e, poisson=poisson) for k, e in enumerate(young)}
     supports = [bridge.roller(1, (1, 0)), bridge.roller(2, (1, 0)), bridge.fixed(3)]
     model = bridge.QuasiStatic(domain, laws, facet_tags, supports, degree=1, nmd=True, cell_tags=tags)
@@ -318,3 +324,22 @@ def test_particles_equilibrate_by_the_forces_of_the_steps_that_follow():
         _, model = clay_block(mpm.Geometry.PLANE_STRAIN)
         model.equilibrate(nmd=True, tolerance=1e-9, averaged_forces=averaged, solver=mpm.Newton(tolerance=1e-10))
         assert model.out_of_balance(nmd=averaged) < 1e-8 < 1e-4 < model.out_of_balance(nmd=not averaged)
+
+
+def test_soils_are_averaged_apart_as_soon_as_their_stiffness_differs():
+    """Another law in the same elements: as in elements that had it from the beginning."""
+    soft, stiff = (mpm.LinearElastic(young=e, poisson=0.3) for e in (2e6, 20e6))
+    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (1.0, 1.0), (6, 6))
+    tags = halves(domain, 1.0)
+    moved = []
+    for before in ({0: soft, 1: stiff}, {0: soft, 1: soft}):
+        model = bridge.QuasiStatic(domain, before, facet_tags, [bridge.fixed(3)], degree=1, nmd=True, cell_tags=tags)
+        assert model.equilibrate(bridge.Load(unit_weight=20e3), law={0: soft, 1: stiff}).converged
+        moved.append(model.displacement.x.array.copy())
+    assert np.allclose(moved[0], moved[1], rtol=0, atol=1e-9 * np.abs(moved[0]).max())
+
+
+def test_particles_with_further_laws_average_as_elements_without_them():
+    soft, stiff, unused = (mpm.LinearElastic(young=e, poisson=0.3) for e in (2.0e6, 2.4e6, 1.8e6))
+    fem, model = clay_block(mpm.Geometry.PLANE_STRAIN, law=soft, below=stiff, more=[unused])
+    assert bridge.initialise(model, fem, count_displacement=False, equilibrate=False).unbalanced_ratio < 1e-9

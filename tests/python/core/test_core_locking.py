@@ -84,13 +84,24 @@ def test_a_uniform_pressure_is_in_equilibrium_where_soils_of_different_averages_
     assert np.abs(model.particles.velocity).max() < 1e-10 * scale
 
 
-def test_soils_are_averaged_together_while_their_stiffness_is_alike():
-    moduli = [1.2e6, 3e6, 1e6, 3.7e6, 1.24e6, 3e8]  # within a factor of 1.25 of the softest of a group
-    laws = [mpm.LinearElastic(young=young, poisson=0.3) for young in moduli]
-    assert _core.stiffness_groups(laws) == [0, 1, 0, 1, 0, 2]
-    # The water makes undrained soils alike, of whatever skeleton.
-    undrained = [mpm.Undrained(law, water_modulus=2e9, porosity=0.4) for law in laws[:4]]
-    assert _core.stiffness_groups(undrained) == [0] * 4
+def elastic_of(p_wave_modulus):
+    return mpm.LinearElastic(young=p_wave_modulus * 1.3 * 0.4 / 0.7, poisson=0.3)
+
+
+def test_soils_are_averaged_together_while_their_stiffness_is_of_one_class():
+    bounds = 1.25 ** np.arange(60, 90)  # [Pa]
+    within, above = elastic_of(1.2 * bounds[2]), elastic_of(1.01 * bounds[3])
+    laws = [elastic_of(1.01 * bounds[2]), above, within, elastic_of(2e9), above]
+    assert _core.stiffness_groups(laws) == [0, 1, 0, 2, 1]
+    assert _core.stiffness_groups([laws[3], within]) == [1, 0]  # whatever other laws there are
+    # The water makes undrained soils alike, of whatever skeleton; sand counts at 100 kPa, whatever pressure it may reach.
+    undrained = [mpm.Undrained(law, water_modulus=2e9, porosity=0.4) for law in laws[:3]]
+    assert _core.stiffness_groups(undrained) == [0] * 3
+    clays = [
+        mpm.CamClay(compression=0.2, swelling=0.04, critical_slope=1.0, poisson=0.3, void_ratio=1.0, preconsolidation=p)
+        for p in (50e3, 70e3, 100e3)
+    ]
+    assert _core.stiffness_groups(clays) == [0] * 3
     assert _core.stiffness_groups([]) == []
 
 
