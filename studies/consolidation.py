@@ -186,9 +186,14 @@ def follow(a: Namespace, site: ConsolidationSite, model: water.Consolidation, fi
             try:
                 reports = model.run(time, dt, a.growth, progress=made)
             except mpm.RunError as error:
+                files.frame()
                 return f"particles from {model.time / DAY:.4g} days on: {error}"
             if not reports[-1].converged:
-                return f"no step from {model.time / DAY:.4g} days on: {reports[-1].reason}"
+                files.frame()  # where the settlements and excess pressures are that it fails with
+                return (
+                    f"no equilibrium was found from {model.time / DAY:.4g} days on, as where ground fails under its load: "
+                    f"{reports[-1].reason}"
+                )
             dt = first if time in changes else max(dt, max(report.dt for report in reports))
             if time in frames:
                 files.frame()

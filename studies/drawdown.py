@@ -3,8 +3,8 @@
 The site is a TOML file (`meshes/drawdown.toml` unless another is given): mesh, soils, supports, and the level of the reservoir
 in time. Transient seepage gives the pore pressures, and strength reduction the factor of safety at chosen times. The factor is
 compared with two limits: slow drawdown, by the steady flow under the last levels, and fast drawdown without drainage, where
-pore pressures fall by the weight of the water that has left (Morgenstern 1963). `--slower` stretches the times of the
-drawdown.
+pore pressures fall by the weight of the water that has left (Morgenstern 1963). They are no bounds (docs/water.md). `--slower`
+stretches the times of the drawdown.
 """
 
 from __future__ import annotations

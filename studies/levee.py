@@ -128,7 +128,7 @@ class Followed:
     def row(self, time: float) -> dict[str, float]:
         """Values of the columns."""
         left, right = (mean_displacement(self._model, toe)[0] for toe in self._toes)
-        ratios = [1 - now / start for now, start in zip(self._pressures(), self._start)]
+        ratios = [1 - max(now, 0.0) / start for now, start in zip(self._pressures(), self._start)]
         crest, ground = (-mean_displacement(self._model, numbers)[1] for numbers in (self._crest, self._ground))
         return dict(zip(COLUMNS, (time, crest, ground, right - left, *ratios)))
 

@@ -130,10 +130,11 @@ def critical_seismic(model: bridge.QuasiStatic, load: bridge.Load, where: str, a
     """
     progress = step_line(where, "seismic coefficient")
     model.solve(load, progress=progress)
-    if not model.converged:
-        raise mpm.InputError(
-            "--critical-seismic: the soil does not carry its weight without inertia, expected a factor of safety above 1"
-        )
+    if not model.converged:  # what else was found is kept
+        if comm.rank == 0:
+            print("critical seismic coefficient: none, the soil does not carry its weight without inertia")
+        return {"critical_seismic_coefficient": None, "failed_at_seismic_coefficient": 0.0,
+                "failure_shown_by_seismic_coefficient": False}  # fmt: skip
     dim = model.domain.geometry.dim
     found = bridge.collapse_load(model, lambda k: shaken(load, along * k, dim), first_step=0.05, progress=progress)
     if comm.rank == 0:

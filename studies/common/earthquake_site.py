@@ -12,6 +12,7 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import compat
 
+from .checks import say
 from .followed import FollowedNodes
 from .motions import STEP, as_motion, band_limited_noise, ricker
 from .quiet import NOT_REACHED, without_warning
@@ -20,6 +21,8 @@ from .slope_case import GRAVITY
 comm = MPI.COMM_WORLD
 STIFF = 3
 """Cell tag of the lower layer"""
+LARGEST_RECORDED = 25.0
+"""Acceleration of rock [m/s2] above which a motion is a mistake in its unit"""
 FIELDS = ("displacement", "velocity", "stress", "plastic_strain", "volume", "resting")
 """Of particles and resting cells in the files for ParaView"""
 
@@ -34,6 +37,10 @@ def outcrop_motion(a: Namespace) -> tuple[np.ndarray, np.ndarray, mpm.Motion]:
         time, acceleration = band_limited_noise(
             (0.5 * a.frequency, a.highest_frequency), a.peak, a.duration, STEP, a.seed
         )
+    largest = float(np.abs(acceleration).max())
+    where = f"--unit is {a.unit}" if a.accelerogram is not None else "--peak"
+    say(f"the largest acceleration of the outcrop is {largest:.3g} m/s2, more than any that was recorded in rock: check {where}"
+        if largest > LARGEST_RECORDED else "")  # fmt: skip
     return time, acceleration, as_motion(time, acceleration)
 
 

@@ -61,7 +61,13 @@ def noise_band(band: tuple[float, float], duration: float, step: float) -> tuple
 
 
 def as_motion(time: np.ndarray, acceleration: np.ndarray) -> mpm.Motion:
-    """The motion of an acceleration after a linear baseline correction, brought to rest over its last tenth."""
+    """The motion of an acceleration after a linear baseline correction, brought to rest over its last tenth.
+
+    An acceleration that ends at rest by itself, as a Ricker wavelet does, stays as it is.
+    """
+    plain = mpm.motion_of_acceleration(time, acceleration, baseline=None)
+    if abs(plain.velocity[-1]) < 1e-6 * np.abs(plain.velocity).max():
+        return plain
     motion = mpm.motion_of_acceleration(time, acceleration, baseline=1)
     span = time[-1] - time[0]
     fade = np.clip((time[-1] - time) / (0.1 * span), 0.0, 1.0)

@@ -49,7 +49,7 @@ AIR = ("air", "water", "empty")
 """Groups of a mesh that hold no soil by their names"""
 CHANGES = ("excavate", "law", "unit_weight", "pressure", "support", "release")
 """What a stage may change beside soils that it places"""
-DEFAULT_SUPPORTS = {"base": "fixed", "left": "roller", "right": "roller", "sides": "roller"}
+DEFAULT_SUPPORTS = {"base": "fixed", **dict.fromkeys(("left", "right", "sides", "axis", "far"), "roller")}
 
 
 @dataclass
@@ -218,8 +218,14 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
     site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, supports_of(table, path, domain, facet_tags), [],
                 list(others.values()), axisymmetric, rows)  # fmt: skip
     site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(rows)]
+    placed = {soil for stage in site.stages for soil in stage.fill}
+    left = [soil for soil in soils if soil not in placed]
+    if left and rows and "day" not in rows[0]:
+        names = ", ".join(map(repr, left))
+        say(
+            f"{path}: no stage fills the cells of {names}, which therefore hold no soil; name it in fill of a stage where it is there"
+        )
     if rows and "day" in rows[0]:  # what these stages do not place is there before them
-        placed = {soil for stage in site.stages for soil in stage.fill}
         there = {soil: weight for soil, weight in weights.items() if soil not in placed}
         if there:
             site.stages[0] = replace(site.stages[0], reset_displacement=True)

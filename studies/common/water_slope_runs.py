@@ -12,6 +12,7 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import water
 
+from .checks import say
 from .collapse_runs import UNDECIDED
 from .page import Page
 from .results import open_results
@@ -61,6 +62,8 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
         "limits": [{"limit": name, "factor_of_safety": found.value} for name, found in limits.items()],
     }  # fmt: skip
     movies, pictures, code = [], {}, 0
+    if a.slide and failed is None:
+        say("--slide has no effect: the factor of safety remains above 1")
     if a.slide and failed is not None:
         slid, movies, pictures, code = slide_of(a, slope, instants, folder)
         summary |= slid
@@ -70,6 +73,10 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
     fails = "stands" if failed is None else f"fails after {time_in_words(failed)}"
     lines = [f"the slope {fails}; lowest factor of safety {worst.safety.value:.3f} after {time_in_words(worst.time)}"]
     lines += [f"{name}: {value:.3f}" for name, value in values.items()]
+    if values and worst.safety.value < 0.99 * min(values.values()):
+        lines.append(
+            "the lowest factor is below these limits, which are no bounds while water still flows from other parts of the slope"
+        )
     drawn = (slope_pictures(folder, instants, values, a.film) | pictures) if a.pictures else {}
     early = write_summary(folder, a, summary, comm, page, drawn, said="\n".join(lines))
     return early or code or (0 if shown else UNDECIDED)

@@ -170,3 +170,14 @@ def test_the_names_of_curves_lie_beside_those_of_a_record_wherever_its_peak_is(t
     save_record(tmp_path / "record.png", time, acceleration, as_motion(time, acceleration).velocity)
     legend, panel = boxes
     assert not legend.overlaps(panel)
+
+
+def test_a_ricker_wavelet_needs_no_baseline_correction():
+    """It ends at rest, where it began; a correction moved it by up to 38 mm."""
+    peak, frequency = 3.0, 1.0
+    motion = as_motion(*ricker(frequency, peak, 3.0, 0.01))
+    displacement = np.append(0.0, np.cumsum(0.5 * np.diff(motion.time) * (motion.velocity[1:] + motion.velocity[:-1])))
+    largest = peak / (2 * np.pi**2 * frequency**2)  # its displacement at the peak
+    assert abs(displacement[-1]) < 1e-6 * largest
+    assert np.abs(displacement).max() == pytest.approx(largest, rel=1e-3)
+    assert np.abs(accelerations(motion.time, motion.velocity)[1]).max() == pytest.approx(peak, rel=0.01)
