@@ -201,6 +201,8 @@ def critical_slope(a: Namespace) -> dict[str, object]:
     found = critical_seismic(
         slope_fem(a, comm, a.cell_size, angle, a.depth), weight(a.unit_weight), f"cells of {a.cell_size:g} m"
     )
+    if found["critical_seismic_coefficient"] is None or bridge.log_spiral_safety(*soil, depth=a.depth) <= 1:
+        return found | {"limit_analysis_seismic_coefficient": None}
     limit = bridge.log_spiral_seismic(*soil, depth=a.depth)
     if comm.rank == 0:
         curve = bridge.log_spiral(*soil[:4], a.crest, depth=a.depth, seismic=limit).curve

@@ -58,6 +58,12 @@ def test_an_earthquake_as_a_force_that_stays(tmp_path):
     assert again["factor_of_safety"] == pytest.approx(1.0, abs=5e-3)
 
 
+def test_a_slope_that_fails_without_inertia_keeps_its_factor(tmp_path):
+    weak = ["--cohesion", "700", "--cell-size", "0.2", "--meshes", "1", "--no-without-dilation", "--critical-seismic"]
+    summary = summary_of("safety", tmp_path, *weak)
+    assert summary["factor_of_safety"] < 1 and summary["critical_seismic_coefficient"] is None
+
+
 def test_a_critical_coefficient_of_a_mesh_that_is_too_short_says_so(tmp_path):
     """The deep slip lines of clay begin far behind the crest; a short mesh fails at a larger coefficient than limit analysis."""
     clay = ["--friction-angle", "0", "--cohesion", "6e3", "--depth", "1", "--cell-size", "0.25", "--meshes", "1"]

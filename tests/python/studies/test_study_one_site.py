@@ -151,6 +151,17 @@ def test_a_group_of_the_mesh_without_a_soil_is_named_unless_it_is_declared_as_ai
     assert not any("'air'" in str(one.message) for one in said)
 
 
+def test_a_soil_that_no_stage_fills_is_named(tmp_path):
+    from common.site_file import read_site
+
+    text = written(tmp_path).read_text()
+    stages = text.index("[[stages]]")
+    path = tmp_path / "site.toml"
+    path.write_text(text[:stages] + '[[stages]]\nname = "in situ"\nfill = ["ground"]\n')
+    with pytest.warns(RuntimeWarning, match="no stage fills the cells of 'bank', which therefore hold no soil"):
+        read_site(path, MPI.COMM_WORLD, 3.0)
+
+
 def test_a_run_on_several_meshes_warns_once(tmp_path):
     words = f"--site {ground_alone(tmp_path)} --cell-size 3 --meshes 2 --elements P1 --output {tmp_path}/results"
     with warnings.catch_warnings(record=True) as said:
