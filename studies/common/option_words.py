@@ -11,8 +11,10 @@ OPTIONS = {
     "integration=MIXED": "--integration mixed",
     "integration=PARTICLES": "--integration particles",
     "second_order=True": "--second-order",
+    "a smaller start": "a smaller --start",
+    "more steps of relaxation (max_steps of Solver), a tolerance as in practice (PRACTICE)": "--equilibrium practice",
 }
-"""Arguments of runs of particles, and the options of studies that set them"""
+"""Words of the library, and those of studies that have the option in them"""
 
 
 def in_options(text: str, parser: ArgumentParser | None) -> str:
@@ -25,7 +27,7 @@ def in_options(text: str, parser: ArgumentParser | None) -> str:
     if parser is None:
         return text
     options = {option: action for action in parser._actions for option in action.option_strings}
-    words = {argument: option for argument, option in OPTIONS.items() if option.split()[0] in options}
+    words = {here: there for here, there in OPTIONS.items() if options.keys() & set(there.split())}
     elements = str(options["--elements"].metavar).split("|") if "--elements" in options else []
     quadratic = [name for name in ("P2", "P4") if name in elements]
     if "degree=" in text and quadratic:  # it is about elements, whose averages --nmd may not choose

@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from fenics_bridge.fem import failure
 from fenics_bridge.fem.locking import warn_of_locking_at_failure
 from mpm_core import failure_watch
 
@@ -90,6 +91,14 @@ def warned_of_elements():
 def test_warnings_of_the_library_name_the_options_of_a_study(study, message, said, not_said):
     text = in_options(message(), importlib.import_module(study).parser())
     assert re.search(said, text) and not re.search(not_said, text)
+
+
+def test_errors_of_the_library_name_the_options_of_a_study():
+    parser = importlib.import_module("safety").parser()
+    assert in_options(failure.advice("no equilibrium", [], None, False), parser).endswith(
+        "gave up: try smaller steps, --equilibrium practice, or more dilation"
+    )
+    assert "a smaller --start" in in_options("2.1 %, or take a smaller start", parser)
 
 
 def test_a_script_without_options_says_what_the_library_says():
