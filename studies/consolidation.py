@@ -217,26 +217,34 @@ def begin_stage(site: ConsolidationSite, model: water.Consolidation, files: File
 
 
 def drawn(site: ConsolidationSite, files: Files, folder: Path) -> Pictures:
-    """Excess pressures at the frames and in a film; settlements and the largest excess pressure over the logarithm of time."""
+    """Excess pressures at the frames and in a film; settlements and the largest excess pressure over time."""
     shown, history = [picture for picture in files.pictures if picture is not None], files.history
-    days = history["time_days"][1:]
-    settled = {name: 1e3 * history[f"settlement_{name}_m"][1:] for name in site.points}
-    largest = {"largest": 1e-3 * history["largest_excess_pressure_Pa"][1:]}
+    stages = [stage.start / DAY for stage in site.stages[1:] if 0 < stage.start / DAY < history["time_days"][-1]]
+    since = 0 if stages else 1  # the logarithm of time has no beginning
+    days = history["time_days"][since:]
+    settled = {name: 1e3 * history[f"settlement_{name}_m"][since:] for name in site.points}
+    largest = {"largest": 1e-3 * history["largest_excess_pressure_Pa"][since:]}
     x, theirs, settled_theirs, largest_theirs = next(iter(site.points.values()))[0], [], {}, {}
     if files.particles is not None:
         theirs = [frame for frame in files.particles.frames if frame is not None]
-        settled_theirs = {name: 1e3 * history[f"settlement_{name}_particles_m"][1:] for name in site.points}
-        largest_theirs = {"largest": 1e-3 * history["largest_excess_pressure_particles_Pa"][1:]}
+        settled_theirs = {name: 1e3 * history[f"settlement_{name}_particles_m"][since:] for name in site.points}
+        largest_theirs = {"largest": 1e-3 * history["largest_excess_pressure_particles_Pa"][since:]}
     pictures: Pictures = {
         "excess_pressure.png": lambda: save_excess(folder / "excess_pressure.png", shown),
         "isochrones.png": lambda: save_isochrones(
             folder / "isochrones.png", x, shown, [near_line(frame, x) for frame in theirs]
         ),
         "settlement.png": lambda: save_over_time(
-            folder / "settlement.png", days, settled, "Settlement [mm]", True, settled_theirs
+            folder / "settlement.png", days, settled, "Settlement [mm]", True, settled_theirs, stages
         ),
         "largest_excess.png": lambda: save_over_time(
-            folder / "largest_excess.png", days, largest, "Largest excess pore pressure [kPa]", False, largest_theirs
+            folder / "largest_excess.png",
+            days,
+            largest,
+            "Largest excess pore pressure [kPa]",
+            False,
+            largest_theirs,
+            stages,
         ),
     }
     moving = [picture for picture in files.film if picture is not None]
@@ -253,8 +261,8 @@ def drawn(site: ConsolidationSite, files: Files, folder: Path) -> Pictures:
 CAPTIONS = {
     "excess_pressure": "Pore pressure above that at the beginning, on the deformed ground",
     "isochrones": "Excess pore pressure below the first point of the site",
-    "settlement": "Settlement of the points of the site over the logarithm of time",
-    "largest_excess": "Largest excess pore pressure over the logarithm of time",
+    "settlement": "Settlement of the points of the site over time",
+    "largest_excess": "Largest excess pore pressure over time",
     "particles_excess": "Excess pore pressure of the particles when it is largest",
 }
 

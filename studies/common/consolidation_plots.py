@@ -138,18 +138,22 @@ def save_over_time(
     label: str,
     downward: bool = False,
     particles: Mapping[str, np.ndarray] | None = None,
+    stages: Sequence[float] = (),
 ) -> None:
-    """Curves over the logarithm of the time, by name; particles: values beside those of the same name, as open marks.
+    """Curves over the time, by name; particles: values beside those of the same name, as open marks.
 
     downward: with the vertical axis turned over, as for settlements
+    stages: days at which further stages begin, which are marked; without any the time is on a logarithmic scale
     """
     with curve_figure(path, (4.9, 3.3)) as axes:
+        if not stages:
+            axes.set_xscale("log")
+        for day in stages:
+            axes.axvline(day, color="0.75", linewidth=0.7, linestyle="--", zorder=0)
         for colour, (name, values) in zip(cycle(CURVES), curves.items()):
-            axes.semilogx(
-                days, values, "-" if particles else "o-", color=colour, markersize=2.5, linewidth=1.1, label=name
-            )
+            axes.plot(days, values, "-" if particles else "o-", color=colour, markersize=2.5, linewidth=1.1, label=name)
         for colour, (name, values) in zip(cycle(CURVES), (particles or {}).items()):
-            axes.semilogx(
+            axes.plot(
                 days, values, "o", color=colour, markersize=3.5, markerfacecolor="none", label=f"{name}, particles"
             )
         axes.set(xlabel="Time [days]", ylabel=label)
