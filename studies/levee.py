@@ -162,11 +162,13 @@ def frame_at(model: mpm.Model, start: np.ndarray, time: float) -> dict | None:
     frame = own_frame(model, time, averaged=True)
     frame["position"] = (p.position + p.displacement).astype(np.float32)
     corners = model.mesh.points[model.mesh.cells[p.cell]].reshape(-1, 6) + np.tile(p.displacement, 3)
-    ratio = np.where(p.material == len(SOILS), np.clip(1 - effective_pressure(model) / start, 0.0, 1.0), 0.0)
+    sand = p.material == len(SOILS)
+    ratio = np.where(sand, np.clip(1 - effective_pressure(model) / start, 0.0, 1.0), 0.0)
     more = {
         "resting": np.ones(len(p), np.float32),
         "corners": corners.astype(np.float32),
         "ratio": ratio.astype(np.float32),
+        "sand": sand.astype(np.float32),
     }
     return gathered(model.comm, {**frame, **more})
 
@@ -182,7 +184,7 @@ def drawn(a: Namespace, folder: Path, record: tuple, history: History, frames: l
     pictures = {
         "record": partial(save_record, folder / "record.png", record[0], record[1], record[2].velocity),
         "liquefaction": partial(save_liquefaction, folder / "liquefaction.png", history),
-        "pore_pressure": partial(save_ground, folder / "pore_pressure.png", last, "ratio", RATIO),
+        "pore_pressure": partial(save_ground, folder / "pore_pressure.png", last, "ratio", RATIO, within="sand"),
         "displacement": partial(save_ground, folder / "displacement.png", last, "displacement", DISPLACEMENT),
         "shear_strain": partial(save_ground, folder / "shear_strain.png", last, "shear_strain", SHEAR_STRAIN),
     }  # fmt: skip

@@ -73,7 +73,9 @@ def save_amplification(path: Path, exact: Curve, found: Mapping[str, Curve]) -> 
         axes.legend(fontsize=8)
 
 
-def save_ground(path: Path, frame: Mapping[str, np.ndarray], name: str, quantity: Quantity) -> None:
+def save_ground(
+    path: Path, frame: Mapping[str, np.ndarray], name: str, quantity: Quantity, within: str | None = None
+) -> None:
     """Resting cells as triangles and particles as discs, in the colours of a quantity.
 
     Args:
@@ -81,10 +83,14 @@ def save_ground(path: Path, frame: Mapping[str, np.ndarray], name: str, quantity
             ``corners`` (n, 6) [m] of each row's cell, and the quantity.
         name: of the quantity in the frame.
         quantity: how it is shown.
+        within: name in the frame of whether a row has the quantity, (n,); others are grey. By default all have it.
     """
-    values, rest = quantity.scale * frame[name], frame["resting"].astype(bool)
+    values, rest = np.ma.array(quantity.scale * frame[name]), frame["resting"].astype(bool)
+    if within is not None:
+        values[frame[within] == 0] = np.ma.masked
     limits = colour_limits(quantity, [frame[name]])
-    look = {"cmap": quantity.colours, "norm": Normalize(*limits), "linewidths": 0.2}
+    colours = plt.get_cmap(quantity.colours).with_extremes(bad="0.8")
+    look = {"cmap": colours, "norm": Normalize(*limits), "linewidths": 0.2}
     corners = frame["corners"].reshape(-1, 3, 2)
     low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     with paper_style():
