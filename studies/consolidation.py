@@ -276,7 +276,8 @@ def main(arguments: list[str] | None = None) -> int:
     site = read_consolidation_site(a.site, comm, a.cell_size, pressures_of(a.pressures or []))
     say("" if site.changes_until(DAY * a.days) else
         f"nothing changes within {a.days:g} days, so that the ground stays in its first equilibrium, which includes pressures that are numbers: "
-        "a load that consolidates the ground begins at 0, such as 'top = [[0.0, 0.0], [0.01, 30e3]]', rows of [days, Pa]")  # fmt: skip
+        "a load that consolidates the ground begins at 0, such as 'top = [[0.0, 0.0], [0.01, 30e3]]' in the file, rows of [days, Pa], "
+        "or '--pressures top=0:0,0.01:30e3'")  # fmt: skip
     folder = open_results(a, comm)
     model = site.at_rest(ELEMENTS[a.elements], a.nmd and a.elements == "P1-P1")
     with ExitStack() as stack:

@@ -14,7 +14,7 @@ from fenics_bridge.mesh.names import label
 def explained(fem: Any, reason: str, load: Any) -> str:
     """The reason why a QuasiStatic found no equilibrium under a load, with load, place, soil, law and advice. Collective."""
     where, soil, law, tension = most_moved(fem)
-    place = ", ".join(f"{x:.3g}" for x in where)
+    place = ", ".join(f"{round(float(x), 6):.3g}" for x in where)  # without what round-off leaves of zero
     name = "" if soil is None else f"the soil {label(fem.cell_tags, soil)} "
     return (
         f"{reason}; under {_in_words(fem, load)}; most moved {name}near ({place}) m, which follows the law {law.name}. "
@@ -113,12 +113,16 @@ def _in_words(fem: Any, load: Any) -> str:
     weight = load.unit_weight.items() if isinstance(load.unit_weight, dict) else [(None, load.unit_weight)]
     parts = [f"unit weight {w:.5g} N/m3{_of(fem.cell_tags, tag)}" for tag, w in weight if w]
     forces = load.body_force.items()
-    parts += [f"body force {tuple(map(float, b))} N/m3{_of(fem.cell_tags, tag)}" for tag, b in forces if np.any(b)]
+    parts += [f"body force {_vector(b)} N/m3{_of(fem.cell_tags, tag)}" for tag, b in forces if np.any(b)]
     parts += [f"pressure {p:.5g} Pa{_of(fem.facet_tags, tag)}" for tag, p in load.pressure.items() if p]
-    parts += [f"traction {tuple(map(float, t))} Pa{_of(fem.facet_tags, tag)}" for tag, t in load.traction.items()]
+    parts += [f"traction {_vector(t)} Pa{_of(fem.facet_tags, tag)}" for tag, t in load.traction.items()]
     parts += [f"{load.displacement:.3g} of the prescribed displacements"] if load.displacement else []
     parts += [f"{load.held:.3g} of the forces still held"] if load.held else []
     return ", ".join(parts) or "no load"
+
+
+def _vector(components: Any) -> str:
+    return f"({', '.join(f'{float(x):.5g}' for x in components)})"
 
 
 def _of(tags: Any, tag: Any) -> Any:

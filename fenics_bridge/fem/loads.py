@@ -112,18 +112,21 @@ def _arrays(name: str, vectors: Any) -> Any:
 
 def warn_of_weight(comm: MPI.Comm, load: Load) -> None:
     """Warn of a unit weight that no soil has, such as one in kN/m3 or one that acts upwards; none is fine."""
-    weights = [float(weight) for weight in weight_by_tag(load.unit_weight).values()]
-    odd = [weight for weight in weights if weight and not is_unit_weight(abs(weight))]
-    upwards = [weight for weight in weights if weight < 0]
+    weights = [
+        (float(weight), f" of {tag!r}" if isinstance(tag, str) else "")
+        for tag, weight in weight_by_tag(load.unit_weight).items()
+    ]
+    odd = [(weight, of) for weight, of in weights if weight and not is_unit_weight(abs(weight))]
+    upwards = [(weight, of) for weight, of in weights if weight < 0]
     texts = []
     if upwards:
         texts.append(
-            f"the unit weight is {upwards[0]:.4g} N/m3, so that it acts upwards, expected a number from 0 on: a positive one acts "
+            f"the unit weight{upwards[0][1]} is {upwards[0][0]:.4g} N/m3, so that it acts upwards, expected a number from 0 on: a positive one acts "
             "against the last axis"
         )
     if odd:
         texts.append(
-            f"the unit weight is {odd[0]:.4g} N/m3, expected from {UNIT_WEIGHTS[0]:g} to {UNIT_WEIGHTS[1]:g} N/m3 for a soil: unit "
+            f"the unit weight{odd[0][1]} is {odd[0][0]:.4g} N/m3, expected from {UNIT_WEIGHTS[0]:g} to {UNIT_WEIGHTS[1]:g} N/m3 for a soil: unit "
             "weights are in N/m3, 20e3 for most soils, and n times that in a centrifuge under n g"
         )
     for text in texts if comm.rank == 0 else ():

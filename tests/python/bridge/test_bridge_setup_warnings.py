@@ -10,6 +10,7 @@ from mpi4py import MPI
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import water
+from fenics_bridge.fem.loads import warn_of_weight
 
 LEFT, RIGHT, BASE, TOP = 1, 2, 3, 4
 HELD = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(BASE)]
@@ -186,3 +187,8 @@ def test_a_factor_of_safety_without_a_limit_says_so():
     found = bridge.factor_of_safety(body(soil), bridge.Load(), first_step=1e3)
     assert np.isinf(found.failed_at) and not found.failed
     assert repr(found).startswith(f"<Collapse: no failure, in equilibrium at every value up to {found.value:.6g}")
+
+
+def test_a_warning_of_the_unit_weight_names_the_soil():
+    with pytest.warns(RuntimeWarning, match="unit weight of 'fill' is 19 N/m3"):
+        warn_of_weight(MPI.COMM_SELF, bridge.Load(unit_weight={"ground": 20e3, "fill": 19.0}))
