@@ -42,7 +42,7 @@ import mpm_core as mpm
 
 from .checks import say
 from .site_keys import changes_of, part_of, read_site_table
-from .site_laws import is_number, law_at, law_keys, located, unit_weight_of
+from .site_laws import is_number, law_at, law_keys, located, unit_doubt, unit_weight_of
 from .slope_case import GRAVITY
 
 AIR = ("air", "water", "empty")
@@ -200,6 +200,7 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
         where = f"{path}: soils.{soil}"
         weights[soil] = unit_weight_of(given, where)
         parameters = located(part_of(given, law_keys()), path)
+        say(unit_doubt(parameters, where))
         if not set(parameters) - {"porosity"}:
             raise mpm.InputError(f"{where} has no law, which this study needs: material, and the parameters of the law")
         if any(isinstance(value, dict) for value in parameters.values()):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -79,6 +79,20 @@ def _at_height(name: str, value: Any, height: float | None) -> Any:
             f"{name} is {value}, expected {{value = , per_metre = , top = }}: it grows with depth below top [m]"
         )
     return float(value["value"] + value["per_metre"] * max(value["top"] - height, 0.0))
+
+
+LEAST = {"young": 1e5, "cohesion": 50.0, "shear_strength": 50.0}
+"""Parameters [Pa] below which a soil of a site is probably given in kPa or MPa"""
+
+
+def unit_doubt(parameters: Mapping[str, Any], where: str) -> str:
+    """A warning of stiffness or strength in another unit than Pa; empty where there is no doubt, as for films that keep their volume."""
+    for name, least in LEAST.items():
+        value = parameters.get(name)
+        fluid = name == "young" and is_number(parameters.get("poisson")) and parameters["poisson"] > 0.49
+        if is_number(value) and 0 < value < least and not fluid:
+            return f"{where}: {name} is {value:g} Pa, which hardly any soil has: stresses and moduli are in Pa, such as 10e3 for 10 kPa"
+    return ""
 
 
 def is_number(value: Any) -> bool:

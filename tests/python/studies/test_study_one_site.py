@@ -162,6 +162,20 @@ def test_a_soil_that_no_stage_fills_is_named(tmp_path):
         read_site(path, MPI.COMM_WORLD, 3.0)
 
 
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        (("cohesion = 10e3  # Pa", "cohesion = 10.0"), "soils.bank: cohesion is 10 Pa, which hardly any soil has"),
+        (("young = 20e6  # Pa", "young = 20e3"), "soils.bank: young is 20000 Pa, which hardly any soil has"),
+    ],
+)
+def test_stiffness_and_strength_in_kilopascals_are_named(change, words, tmp_path):
+    from common.site_file import read_site
+
+    with pytest.warns(RuntimeWarning, match=words):
+        read_site(written(tmp_path, change), MPI.COMM_WORLD, 3.0)
+
+
 def test_a_run_on_several_meshes_warns_once(tmp_path):
     words = f"--site {ground_alone(tmp_path)} --cell-size 3 --meshes 2 --elements P1 --output {tmp_path}/results"
     with warnings.catch_warnings(record=True) as said:
