@@ -64,7 +64,7 @@ def test_the_ground_settles_as_its_water_flows_off(of, tmp_path):
     undrained = of(0.88)[0]
     summary = summary_with_water(tmp_path, "--conductivity", "0.03", "--rest", "3")
     history = np.genfromtxt(tmp_path / "history.csv", delimiter=",", names=True)
-    assert undrained["ground_settlement_m"] < -0.01 and summary["ground_settlement_m"] > -0.005
+    assert undrained["ground_settlement_m"] < -0.003 and summary["ground_settlement_m"] > 0.01
     assert summary["largest_pore_pressure_ratio_free_field"] > 0.4
     assert history["pore_pressure_ratio_free_field"][-1] < 0.1
     assert summary["crest_settlement_m"] > summary["crest_settlement_at_end_of_motion_m"]
