@@ -220,17 +220,15 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
                 list(others.values()), axisymmetric, rows)  # fmt: skip
     site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(rows)]
     placed = {soil for stage in site.stages for soil in stage.fill}
-    left = [soil for soil in soils if soil not in placed]
-    if left and rows and "day" not in rows[0]:
+    left = {soil: weight for soil, weight in weights.items() if soil not in placed}
+    if rows and left and "day" in rows[0]:  # what these stages do not place is there before them
+        site.stages[0] = replace(site.stages[0], reset_displacement=True)
+        site.stages.insert(0, bridge.Stage("beginning", fill=list(left), unit_weight=left))
+    elif rows and left:
         names = ", ".join(map(repr, left))
         say(
             f"{path}: no stage fills the cells of {names}, which therefore hold no soil; name it in fill of a stage where it is there"
         )
-    if rows and "day" in rows[0]:  # what these stages do not place is there before them
-        there = {soil: weight for soil, weight in weights.items() if soil not in placed}
-        if there:
-            site.stages[0] = replace(site.stages[0], reset_displacement=True)
-            site.stages.insert(0, bridge.Stage("beginning", fill=list(there), unit_weight=there))
     return site
 
 
