@@ -43,19 +43,25 @@ void sum_shared(NodeExchange& exchange, double* values, int width);
 /// The same for the largest of the values in the place of their sum.
 void max_shared(NodeExchange& exchange, double* values, int width);
 
-/// The same for a vector or span with one entry per node that consists of doubles only; it may be empty.
+/// How many doubles a T consists of.
+template <class T>
+consteval int doubles_in()
+{
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(double) == 0);
+  return static_cast<int>(sizeof(T) / sizeof(double));
+}
+
+/// The same for a vector or span with so many entries per node, which consist of doubles only; it may be empty.
 template <class Values>
-void sum_shared(NodeExchange& exchange, Values&& values)
+void sum_shared(NodeExchange& exchange, Values&& values, int per_node = 1)
 {
   using T = typename std::remove_cvref_t<Values>::value_type;
-  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(double) == 0);
-  sum_shared(exchange, reinterpret_cast<double*>(values.data()), static_cast<int>(sizeof(T) / sizeof(double)));
+  sum_shared(exchange, reinterpret_cast<double*>(values.data()), per_node * doubles_in<T>());
 }
 
 template <class T>
-void max_shared(NodeExchange& exchange, std::vector<T>& values)
+void max_shared(NodeExchange& exchange, std::vector<T>& values, int per_node = 1)
 {
-  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(double) == 0);
-  max_shared(exchange, reinterpret_cast<double*>(values.data()), static_cast<int>(sizeof(T) / sizeof(double)));
+  max_shared(exchange, reinterpret_cast<double*>(values.data()), per_node * doubles_in<T>());
 }
 } // namespace mpm::parallel

@@ -82,18 +82,18 @@ inline void add_plainly(const T& term, T& sum)
 
 /// Adds terms of this rank to sums at nodes; rounded where the exchange asks for reproducible sums, which must be zero
 /// before and which `sum_shared` then adds up exactly.
-/// @param sum_of     the sum at a node; a callable Index -> T&
-/// @param each_term  calls its argument, a callable (Index node, const T& term), with each term, each time alike
+/// @param sum_of     a sum by its number; a callable Index -> T&
+/// @param each_term  calls its argument, a callable (Index sum, const T& term), with each term, each time alike
+/// @param per_node   sums of a node, whose numbers follow each other
 /// @note Collective over neighbours where sums are reproducible
 template <class T, class SumOf, class EachTerm>
-void sum_at_nodes(NodeExchange& exchange, SumOf&& sum_of, EachTerm&& each_term)
+void sum_at_nodes(NodeExchange& exchange, SumOf&& sum_of, EachTerm&& each_term, int per_node = 1)
 {
   if (!exchange.reproducible)
-    return each_term([&sum_of](Index node, const T& term) { add_plainly(term, sum_of(node)); });
-  std::vector<T> largest(exchange.owned.size());
-  each_term([&largest](Index node, const T& term) { keep_largest(term, largest[static_cast<std::size_t>(node)]); });
-  max_shared(exchange, largest);
-  each_term([&](Index node, const T& term)
-            { add_rounded(term, largest[static_cast<std::size_t>(node)], sum_of(node)); });
+    return each_term([&sum_of](Index sum, const T& term) { add_plainly(term, sum_of(sum)); });
+  std::vector<T> largest(exchange.owned.size() * static_cast<std::size_t>(per_node));
+  each_term([&largest](Index sum, const T& term) { keep_largest(term, largest[static_cast<std::size_t>(sum)]); });
+  max_shared(exchange, largest, per_node);
+  each_term([&](Index sum, const T& term) { add_rounded(term, largest[static_cast<std::size_t>(sum)], sum_of(sum)); });
 }
 } // namespace mpm::parallel

@@ -45,7 +45,6 @@ template <class T, int D, class AddCell>
 void sum_at_means(const Mesh<D>& mesh, const MeshPart& part, const AveragedGroups& groups, NodeExchange& exchange,
                   std::span<T> means, AddCell&& add_cell)
 {
-  const int width = groups.count * static_cast<int>(sizeof(T) / sizeof(double));
   const auto each_term = [&](auto&& add)
   {
     for (Index c : part.cells)
@@ -54,17 +53,9 @@ void sum_at_means(const Mesh<D>& mesh, const MeshPart& part, const AveragedGroup
       add_cell(c, [&](int k, const T& term) { add(places[k], term); });
     }
   };
-  if (exchange.reproducible)
-  {
-    std::vector<T> largest(means.size());
-    each_term([&largest](Index mean, const T& term) { keep_largest(term, largest[static_cast<std::size_t>(mean)]); });
-    max_shared(exchange, reinterpret_cast<double*>(largest.data()), width);
-    each_term([&](Index mean, const T& term)
-              { add_rounded(term, largest[static_cast<std::size_t>(mean)], means[static_cast<std::size_t>(mean)]); });
-  }
-  else
-    each_term([means](Index mean, const T& term) { add_plainly(term, means[static_cast<std::size_t>(mean)]); });
-  sum_shared(exchange, reinterpret_cast<double*>(means.data()), width);
+  sum_at_nodes<T>(
+      exchange, [means](Index mean) -> T& { return means[mean]; }, each_term, groups.count);
+  sum_shared(exchange, means, groups.count);
 }
 
 /// Means over the filled cells of each group around each node of a part of the mesh (method of Detournay & Dzik 2006;
@@ -76,13 +67,12 @@ template <int D, class VolumeOf, class IntegralOf>
 void average_over_nodes(const Mesh<D>& mesh, const MeshPart& part, const AveragedGroups& groups, VolumeOf&& volume_of,
                         IntegralOf&& integral_of, NodeExchange& exchange, std::vector<VolumeMean>& means)
 {
-  const auto count = static_cast<std::size_t>(groups.count);
-  means.resize(count * mesh.points.size());
-  const auto for_each_mean = [&](auto&& work)
+  means.resize(static_cast<std::size_t>(groups.count) * mesh.points.size());
+  const auto for_each_mean = [&part, first = means.data(), count = groups.count](auto&& work)
   {
-    for (Index node : part.nodes)
-      for (std::size_t group = 0; group < count; ++group)
-        work(means[count * static_cast<std::size_t>(node) + group]);
+    for (int group = 0; group < count; ++group)
+      for (Index node : part.nodes)
+        work(first[node * count + group]);
   };
   for_each_mean([](VolumeMean& mean) { mean = {}; });
   const auto add_cell = [&](Index c, auto&& add)
