@@ -50,6 +50,8 @@ void find_motions(const Mesh<D>& mesh, const VelocityField<G>& field, const std:
       scratch.motion[r - batch.first_run] = {1 - options.pic_fraction, in_cell(field.velocity_change),
                                              scaled<D>(velocity, options.dt)};
   }
+  for (std::size_t r = batch.last_run - batch.first_run; r % lanes != 0; ++r)
+    scratch.motion[r] = {}; // strains of several cells are found together: lanes beyond the last run stand still
 }
 } // namespace
 
@@ -63,7 +65,7 @@ void find_motions(const Mesh<D>& mesh, const VelocityField<G>& field, const std:
 
 namespace
 {
-/// Strains of the cells of a batch, from the displacements. Beyond the last run the lanes hold what was there before.
+/// Strains of the cells of a batch, from the displacements.
 template <class G, int D = G::dim>
 void find_cell_strains(const Mesh<D>& mesh, const VelocityField<G>& field, const std::vector<Run>& runs,
                        const PassOptions& options, const Batch& batch, BatchScratch<D>& scratch)
