@@ -92,7 +92,7 @@ def main(arguments: list[str] | None = None) -> int:
         "stages": [{"stage": row["stage"], **{k: v for k, v in row.items() if k != "stage"}} for row in rows],
         "wall_seconds": perf_counter() - start,
     }  # fmt: skip
-    captions = {"stages_displacement": "The soil after each stage, by its displacement",
+    captions = {"stages_displacement": "The soil after each stage, by its displacement, with the water table where there is one",
                 "stages_strain": "The soil after each stage, by the strain accumulated since the displacements were reset",
                 "movements": "Largest movements after each stage"}  # fmt: skip
     said = "\n".join(

@@ -22,7 +22,7 @@ from common.figures import Pictures
 from common.followed import cells_near, mean_displacement, numbers_in
 from common.history import History
 from common.lengths import metres
-from common.levee_plots import save_liquefaction
+from common.levee_plots import save_displacement, save_liquefaction
 from common.levee_site import SOILS, damping_of, effective_pressure, loose_sand, model_in_equilibrium
 from common.motion_options import add_motion_options, check_motion
 from common.motions import STEP, accelerations
@@ -30,7 +30,7 @@ from common.movie import gathered, own_frame, particle_movie
 from common.options import add_count, add_number, study_parser
 from common.output_options import add_picture_options
 from common.page import Page
-from common.plots import DISPLACEMENT, SHEAR_STRAIN, Quantity
+from common.plots import SHEAR_STRAIN, Quantity
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
@@ -161,12 +161,14 @@ def frame_at(model: mpm.Model, start: np.ndarray, time: float) -> dict | None:
     p = model.particles
     frame = own_frame(model, time, averaged=True)
     frame["position"] = (p.position + p.displacement).astype(np.float32)
-    corners = model.mesh.points[model.mesh.cells[p.cell]].reshape(-1, 6) + np.tile(p.displacement, 3)
+    mesh_corners = model.mesh.points[model.mesh.cells[p.cell]].reshape(-1, 6)
     sand = p.material == len(SOILS)
     ratio = np.where(sand, np.clip(1 - effective_pressure(model) / start, 0.0, 1.0), 0.0)
     more = {
         "resting": np.ones(len(p), np.float32),
-        "corners": corners.astype(np.float32),
+        "corners": (mesh_corners + np.tile(p.displacement, 3)).astype(np.float32),
+        "mesh_corners": mesh_corners,
+        "moved": p.displacement.astype(np.float32),
         "ratio": ratio.astype(np.float32),
         "sand": sand.astype(np.float32),
     }
@@ -185,7 +187,7 @@ def drawn(a: Namespace, folder: Path, record: tuple, history: History, frames: l
         "record": partial(save_record, folder / "record.png", record[0], record[1], record[2].velocity),
         "liquefaction": partial(save_liquefaction, folder / "liquefaction.png", history),
         "pore_pressure": partial(save_ground, folder / "pore_pressure.png", last, "ratio", RATIO, within="sand"),
-        "displacement": partial(save_ground, folder / "displacement.png", last, "displacement", DISPLACEMENT),
+        "displacement": partial(save_displacement, folder / "displacement.png", last),
         "shear_strain": partial(save_ground, folder / "shear_strain.png", last, "shear_strain", SHEAR_STRAIN),
     }  # fmt: skip
     if a.film:
@@ -218,7 +220,8 @@ def main(arguments: list[str] | None = None) -> int:
         "record": "Motion of the outcrop, as recorded and after the baseline correction",
         "liquefaction": "Excess pore pressures in the middle of the sand, settlement of the crest and spreading of the toes",
         "pore_pressure": "Excess pore pressure ratio at the end",
-        "displacement": "Displacement that stays", "shear_strain": "Plastic shear strain at the end",
+        "displacement": "Displacement that stays, with the outline before the earthquake",
+        "shear_strain": "Plastic shear strain at the end",
     }  # fmt: skip
     scene = scene_of(model, model.mesh.tags_of("cell", SOILS))
     page = Page(movies=[particle_movie("levee", scene, frames)], captions=captions)

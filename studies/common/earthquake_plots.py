@@ -7,8 +7,10 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 
 from .figures import curve_figure, save_figure
 from .motions import accelerations
@@ -73,6 +75,17 @@ def save_amplification(path: Path, exact: Curve, found: Mapping[str, Curve]) -> 
         axes.legend(fontsize=8)
 
 
+def ground_figure(low: np.ndarray, high: np.ndarray) -> tuple[Figure, Axes, Axes]:
+    """A figure for the ground from the lower to the upper corner [m]: its axes, and those of a horizontal colour bar below."""
+    height, margin = WIDTH * (high - low)[1] / (high - low)[0] + 1.3, 0.02 * (high - low)[0]
+    figure, (axes, bar) = plt.subplots(
+        2, 1, figsize=(WIDTH, height), height_ratios=(height - 0.9, 0.12), layout="constrained"
+    )
+    axes.set(aspect="equal", xlabel="$x$ [m]", ylabel="$y$ [m]", xlim=(low[0] - margin, high[0] + margin),
+             ylim=(low[1] - margin, high[1] + margin))  # fmt: skip
+    return figure, axes, bar
+
+
 def save_ground(
     path: Path, frame: Mapping[str, np.ndarray], name: str, quantity: Quantity, within: str | None = None
 ) -> None:
@@ -92,18 +105,11 @@ def save_ground(
     colours = plt.get_cmap(quantity.colours).with_extremes(bad="0.8")
     look = {"cmap": colours, "norm": Normalize(*limits), "linewidths": 0.2}
     corners = frame["corners"].reshape(-1, 3, 2)
-    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     with paper_style():
-        height = WIDTH * (high - low)[1] / (high - low)[0] + 1.3
-        figure, (axes, bar) = plt.subplots(
-            2, 1, figsize=(WIDTH, height), height_ratios=(height - 0.9, 0.12), layout="constrained"
-        )
+        figure, axes, bar = ground_figure(corners.min(axis=(0, 1)), corners.max(axis=(0, 1)))
         cells = PolyCollection(corners[rest], edgecolors="face", array=values[rest], **look)
         axes.add_collection(cells)
         discs(axes, frame["position"][~rest], frame["volume"][~rest], array=values[~rest], **{**look, "linewidths": 0})
-        margin = 0.02 * (high - low)[0]
-        axes.set(aspect="equal", xlabel="$x$ [m]", ylabel="$y$ [m]", xlim=(low[0] - margin, high[0] + margin),
-                 ylim=(low[1] - margin, high[1] + margin))  # fmt: skip
         axes.set_title(f"$t$ = {frame['time']:.1f} s; resting cells drawn as triangles", loc="left", pad=4)
         draw_bar(figure, bar, quantity, limits)
         save_figure(figure, path)

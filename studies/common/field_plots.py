@@ -14,22 +14,16 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator
 
 import fenics_bridge as bridge
 from particle_player import axis_labels, boundary_edges
 
 from .figures import curve_figure, save_figure
-from .plots import (
-    CURVES,
-    ROUND_TICKS,
-    WIDTH,
-    Quantity,
-    Scene,
-    colour_limits,
-    discs,
-    paper_style,
-)
+from .plots import CURVES, ROUND_TICKS, WIDTH, Quantity, Scene, colour_limits, discs, paper_style
+from .soil_outlines import name_places, soil_outlines
+from .water_table import draw_water_table, water_legend
 
 INCREMENT = Quantity("Displacement increment at collapse, relative", "-", colours="viridis")
 INCREMENT_SHEAR = Quantity("Shear strain increment at collapse, relative", "-", colours="inferno")
@@ -41,14 +35,14 @@ class Field:
     """A nodal quantity on triangles, on the first rank.
 
     points: (n, 2) [m]; cells: (m, 3) rows of points; values: (n, k); half_section: of an axisymmetric body
-    borders: segments (k, 2, 2) [m] around soils
+    soils: segments (k, 2, 2) [m] around each soil, by its name
     """
 
     points: np.ndarray
     cells: np.ndarray
     values: np.ndarray
     half_section: bool = False
-    borders: np.ndarray | None = None
+    soils: Mapping[str, np.ndarray] | None = None
 
     @property
     def outline(self) -> np.ndarray:
@@ -98,7 +92,7 @@ def mechanism_field(
 ) -> Field | None:
     """A mechanism at all nodes of its elements, so that elements of higher degree show what moves within them. Collective.
 
-    soils: tags of the cells, by name, whose borders are shown; off: those of them whose cells are not there
+    soils: tags of the cells, by name, whose outlines are shown; off: those of them whose cells are not there
     """
     nodes = mechanism.function_space.dofmap.dof_layout.num_dofs
     parts = round((np.sqrt(8 * nodes + 1) - 3) / 2)
@@ -106,28 +100,11 @@ def mechanism_field(
     if soils is None:
         return field
     domain = mechanism.function_space.mesh
-    borders, mesh = soil_borders(domain, soils, off), bridge.background_arrays(domain, soils)
+    outlines, mesh = soil_outlines(domain, soils, off), bridge.background_arrays(domain, soils)
     there = domain.comm.gather(~np.isin(mesh["cell_tags"][mesh["cell_owners"] == domain.comm.rank], off))
     if field is None or there is None:
         return None
-    return replace(field, cells=field.cells[np.repeat(np.concatenate(there), parts**2)], borders=borders)
-
-
-def soil_borders(domain: object, cell_tags: object, off: Sequence[int] = ()) -> np.ndarray | None:
-    """Sides of cells around each soil with a name: segments (k, 2, 2) [m]; None but on the first rank. Collective.
-
-    off: tags of the soils that are not there
-    """
-    mesh = bridge.background_arrays(domain, cell_tags)
-    own = (mesh["cell_owners"] == domain.comm.rank) & ~np.isin(mesh["cell_tags"], off)
-    parts = domain.comm.gather((mesh["points"][mesh["cells"][own]], mesh["cell_tags"][own]))
-    if parts is None:
-        return None
-    corners, tags = (np.concatenate(arrays) for arrays in zip(*parts))
-    points, cells = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
-    cells = cells.reshape(-1, 3)
-    of_soils = [boundary_edges(cells[np.isin(tags, of_soil)]) for of_soil in bridge.names_of(cell_tags).values()]
-    return points[np.concatenate([np.empty((0, 2), int), *of_soils])]
+    return replace(field, cells=field.cells[np.repeat(np.concatenate(there), parts**2)], soils=outlines)
 
 
 def _divided(parts: int) -> tuple[np.ndarray, np.ndarray]:
@@ -237,17 +214,22 @@ def save_mechanism(
     line: np.ndarray | None = None,
     line_name: str = "",
     box: tuple[tuple[float, float], tuple[float, float]] | None = None,
+    water: np.ndarray | None = None,
 ) -> None:
-    """Draw a displacement increment: its length with arrows, and below it its shear strain.
+    """Draw a displacement increment: its length with arrows, and beside it its shear strain, with the names of the soils.
 
     Args:
         field: the increment, in any unit.
         line: (k, 2) [m] drawn over both, such as the slip line of limit analysis.
         line_name: for the legend.
         box: (lower, upper) corner of what is shown; all by default.
+        water: segments (k, 2, 2) [m] of the water table, in the soil and over standing water.
     """
+    wet = water is not None and len(water) > 0
     lengths, shear = np.linalg.norm(field.values, axis=1), field.shear()
     lower, upper = (np.array(corner) for corner in box or (field.points.min(axis=0), field.points.max(axis=0)))
+    if wet and box is None:  # water may stand above all soil
+        upper[1] = max(upper[1], water[..., 1].max())
     with paper_style():
         figure, panels = _panels(lower, upper, 2, field.half_section)
         for (axes, bar), quantity in zip(panels, (INCREMENT, INCREMENT_SHEAR)):
@@ -258,16 +240,30 @@ def save_mechanism(
             values = () if is_shear else (lengths / top,)
             axes.tripcolor(*field.points.T, field.cells, *values, cmap=quantity.colours, vmin=0, vmax=1, rasterized=True,
                            **shown)  # fmt: skip
-            if field.borders is not None:
-                axes.add_collection(LineCollection(field.borders, colors="#a0a0a0", linewidths=0.6, zorder=2))
+            for outline in (field.soils or {}).values():
+                axes.add_collection(LineCollection(outline, colors="#a0a0a0", linewidths=0.6, zorder=2))
+            if wet:
+                draw_water_table(axes, water)
             if line is not None:
                 axes.plot(*line.T, "--", color=LINE, linewidth=1.4, label=line_name)
             _bar(figure, bar, quantity, (0.0, 1.0), "max" if is_shear else "neither")
         _arrows(panels[0][0], field, lower, upper)
         panels[0][0].set_title(title, loc="left", pad=4)
+        _soil_names(panels[1][0], field.soils or {})
+        if wet:
+            water_legend(panels[1][0])
         if line is not None:
             panels[1][0].legend(loc="lower right", bbox_to_anchor=(1.02, 0.98), fontsize=9)
         save_figure(figure, path)
+
+
+def _soil_names(axes: Axes, soils: Mapping[str, np.ndarray]) -> None:
+    """Write the names of soils into them, where there are several."""
+    if len(soils) < 2:
+        return
+    for name, place in name_places(soils).items():
+        axes.text(*place, name, color="white", fontsize=7, ha="center", va="center", zorder=7, clip_on=True,
+                  path_effects=[withStroke(linewidth=1.6, foreground="#202020")])  # fmt: skip
 
 
 def _arrows(axes: Axes, field: Field, lower: np.ndarray, upper: np.ndarray) -> None:

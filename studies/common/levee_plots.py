@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
-from .figures import curve_figure
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+
+from particle_player import boundary_edges
+
+from .earthquake_plots import ground_figure
+from .figures import curve_figure, paper_style, save_figure
 from .history import History
-from .plots import CURVES, WIDTH
+from .plots import CURVES, DISPLACEMENT, WIDTH, colour_limits, draw_bar
 
 
 def save_liquefaction(path: Path, history: History) -> None:
@@ -34,3 +42,72 @@ def save_liquefaction(path: Path, history: History) -> None:
             panel.legend(ncols=3, loc="upper left", fontsize=8)
         axes[0].axhline(1.0, color="#b0b0b0", linewidth=0.8, zorder=0)
         axes[-1].set_xlabel("Time [s]")
+
+
+def save_displacement(path: Path, frame: Mapping[str, np.ndarray]) -> None:
+    """Resting cells, displaced on an enlarged scale, in the colours of their displacement, with arrows and their outline before.
+
+    Args:
+        frame: of all rows, with ``time`` [s], the ``mesh_corners`` (n, 6) [m] of each row's cell without its displacement, as in
+            the mesh to the last digit, and the vectors ``moved`` (n, 2) [m] of this.
+    """
+    points, cells = np.unique(frame["mesh_corners"].reshape(-1, 2), axis=0, return_inverse=True)
+    cells = cells.reshape(-1, 3)
+    moved = _means_at_points(cells, frame["moved"], len(points))
+    lengths = np.linalg.norm(moved, axis=1)
+    enlarged = enlargement(lengths.max(), np.ptp(points[:, 0]))
+    shown, limits = points + enlarged * moved, colour_limits(DISPLACEMENT, [lengths])
+    longer = 1.4 * _spacing(points) / limits[1]  # arrows over displacements
+    with paper_style():
+        every = np.concatenate([points, shown, shown + longer * moved])
+        figure, axes, bar = ground_figure(every.min(axis=0), every.max(axis=0))
+        axes.tripcolor(*shown.T, cells, lengths, cmap=DISPLACEMENT.colours, vmin=limits[0], vmax=limits[1], shading="gouraud",
+                       rasterized=True)  # fmt: skip
+        sides = boundary_edges(cells)
+        axes.add_collection(LineCollection(shown[sides], colors="black", linewidths=0.8))
+        axes.add_collection(
+            LineCollection(
+                points[sides], colors="#404040", linewidths=0.7, linestyles="dashed", label="before the earthquake"
+            )
+        )
+        _arrows(axes, shown, moved, longer, limits[1])
+        axes.legend(loc="lower right", bbox_to_anchor=(0.86, 1.0), borderaxespad=0.1, fontsize=8)
+        scale = f", enlarged {enlarged:g} times" if enlarged > 1 else ""
+        axes.set_title(f"$t$ = {frame['time']:.1f} s; displacements{scale}", loc="left", pad=4)
+        draw_bar(figure, bar, DISPLACEMENT, limits)
+        save_figure(figure, path)
+
+
+def _means_at_points(cells: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    """Means at each of `count` points of the values (n, k) of the cells (n, 3) around it: (count, k)."""
+    sums, around = np.zeros((count, values.shape[1])), np.bincount(cells.ravel(), minlength=count)
+    np.add.at(sums, cells.ravel(), np.repeat(values, 3, axis=0))
+    return sums / around[:, None]
+
+
+def enlargement(largest: float, width: float) -> float:
+    """How many times displacements are enlarged so that the largest is up to a thirtieth of the width: 1, 2, 5, 10, 20, ..."""
+    wanted = width / 30 / largest if largest > 0 else 1.0
+    steps = np.outer(10.0 ** np.arange(6), (1, 2, 5)).ravel()
+    return float(steps[max(0, np.searchsorted(steps, wanted, side="right") - 1)])
+
+
+def _spacing(points: np.ndarray) -> float:
+    """Distance of arrows [m]."""
+    return np.ptp(points[:, 0]) / 24
+
+
+def _arrows(axes: Axes, points: np.ndarray, moved: np.ndarray, longer: float, largest: float) -> None:
+    """Arrows at points that are nearest to a raster, `longer` times their displacement, and one above that gives their scale.
+
+    largest: displacement at the end of the colour scale [m]; where it is far smaller there are no arrows
+    """
+    raster = np.rint(points / _spacing(points))
+    order = np.argsort(np.linalg.norm(points - _spacing(points) * raster, axis=1))
+    _, first = np.unique(raster[order], axis=0, return_index=True)
+    nodes = order[first]
+    nodes = nodes[np.linalg.norm(moved[nodes], axis=1) > 0.08 * largest]
+    arrows = axes.quiver(*points[nodes].T, *moved[nodes].T, angles="xy", scale_units="xy", scale=1 / longer, width=0.0026,
+                         color="white", edgecolor="#202020", linewidth=0.4, zorder=4)  # fmt: skip
+    key = 0.5 * largest
+    axes.quiverkey(arrows, 0.91, 1.055, key, f"{key:.3g} m", labelpos="E", fontproperties={"size": 8})

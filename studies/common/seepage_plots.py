@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import Normalize
+from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
@@ -24,11 +23,13 @@ from .animation import save_figure_film
 from .field_plots import Field, gathered
 from .figures import save_figure
 from .plots import ROUND_TICKS, Quantity, paper_style
+from .water_table import draw_water_table, polyline_segments, water_legend, zero_line
 
 HEAD = Quantity("Total head", "m", colours="viridis")
-PRESSURE = Quantity("Pore pressure", "kPa", scale=1e-3, colours="viridis")
+PRESSURE = Quantity("Pore pressure", "kPa", scale=1e-3, colours="BrBG")
 SATURATION = Quantity("Degree of saturation", "-", colours="viridis")
-TABLE = "#1f6fd0"
+MODERATE = 50.0
+"""Suction [kPa] that a scale of pore pressures shows, where there is so much"""
 
 
 @dataclass
@@ -45,6 +46,11 @@ class FlowPicture:
     saturation: np.ndarray
     unit_weight: float
     levels: list[np.ndarray] = field(default_factory=list)
+
+    def table(self) -> np.ndarray:
+        """Water table in the soil, where the pressure is zero, and the surface of standing water: segments (k, 2, 2) [m]."""
+        lines = [polyline_segments(line) for line in self.levels]
+        return np.concatenate([zero_line(self.head.points, self.head.cells, self.head.values[:, 0]), *lines])
 
     @property
     def total(self) -> np.ndarray:
@@ -105,45 +111,75 @@ def save_flow_film(path: Path, pictures: Sequence[FlowPicture], quantity: Quanti
     return save_figure_film(path, pictures, lambda picture: _figure([picture], quantity, scales))
 
 
-def _scales(pictures: Sequence[FlowPicture], quantity: Quantity) -> tuple[tuple[float, float], float]:
-    """Limits of the quantity as shown, and the largest velocity [m/s], of all pictures."""
+def _scales(pictures: Sequence[FlowPicture], quantity: Quantity) -> tuple[np.ndarray, float]:
+    """Values at which the colours of the quantity change, as shown, and the largest velocity [m/s], of all pictures."""
     every = np.concatenate([picture.values(quantity) for picture in pictures])
-    ticks = ROUND_TICKS.tick_values(every.min(), every.max())
-    return (ticks[0], ticks[-1]), max(float(np.linalg.norm(one.velocity, axis=1).max()) for one in pictures)
+    low, high = pressure_limits(pictures) if quantity is PRESSURE else (every.min(), every.max())
+    ticks = ROUND_TICKS.tick_values(low, high)
+    parts = 2 * (len(ticks) - 1) if quantity is PRESSURE else 20  # so that pressures change their colour at zero
+    return np.linspace(ticks[0], ticks[-1], parts + 1), max(
+        float(np.linalg.norm(one.velocity, axis=1).max()) for one in pictures
+    )
 
 
-def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[tuple[float, float], float]) -> Figure:
+def pressure_limits(pictures: Sequence[FlowPicture]) -> tuple[float, float]:
+    """Limits [kPa] for pore pressures, with zero between them; strong suction in a part of the dry soil is left out.
+
+    Below the water table all pressures are shown. Above it suction is shown up to the largest pressure, up to `MODERATE`, and up to
+    what half of the unsaturated soil exceeds in one of the pictures, whichever is most, as far as there is so much.
+    """
+    values = [picture.values(PRESSURE) for picture in pictures]
+    high = max(0.0, *(v.max() for v in values))
+    widespread = max(_median_suction(picture.head, v) for picture, v in zip(pictures, values))
+    return max(min(0.0, *(v.min() for v in values)), -max(high, MODERATE, widespread)), high
+
+
+def _median_suction(head: Field, pressure: np.ndarray) -> float:
+    """Suction that half of the unsaturated soil exceeds; 0 where all is saturated. pressure: at the points of the head."""
+    mean = pressure[head.cells].mean(axis=1)
+    dry = mean < 0
+    return -replace(head, cells=head.cells[dry]).exceeded_in(0.5, mean[dry]) if dry.any() else 0.0
+
+
+def _colours(quantity: Quantity, limits: tuple[float, float]) -> Colormap:
+    """Colours from limit to limit; those of pore pressure change from suction to pressure at zero."""
+    colours = plt.get_cmap(quantity.colours)
+    if quantity is not PRESSURE:
+        return colours
+    values = np.linspace(*limits, 256)
+    return ListedColormap(colours(0.5 + 0.5 * values / np.abs(values).max()))
+
+
+def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[np.ndarray, float]) -> Figure:
     """A panel for each flow, above one another."""
     points = pictures[0].head.points
     low, high = points.min(axis=0), points.max(axis=0)
-    limits, fastest = scales
-    aspect, levels = (high[1] - low[1]) / (high[0] - low[0]), np.linspace(*limits, 21)
+    levels, fastest = scales
+    aspect, limits = (high[1] - low[1]) / (high[0] - low[0]), (levels[0], levels[-1])
+    colours, norm = _colours(quantity, limits), Normalize(*limits)
     figure, panels = plt.subplots(len(pictures), 1, figsize=(6.9, len(pictures) * (5.8 * aspect + 0.35) + 0.4), sharex=True,
                                   squeeze=False, layout="constrained")  # fmt: skip
-    table = False
+    table, least = False, limits[0]
     for axes, picture in zip(panels[:, 0], pictures):
+        axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]), ylabel="$y$ [m]")
         triangles = Triangulation(*picture.head.points.T, picture.head.cells)
-        axes.tricontourf(triangles, picture.values(quantity), levels, cmap=quantity.colours, extend="both")
         values, lines = picture.values(quantity), levels[1:-1]
+        least = min(least, values.min())
+        axes.tricontourf(triangles, values, levels, cmap=colours, norm=norm, extend="both")
         if np.any((lines > values.min()) & (lines < values.max())):  # matplotlib warns of none
             axes.tricontour(triangles, values, lines, colors="black", linewidths=0.35, alpha=0.6)
         _flow_lines(axes, triangles, picture, (low, high), fastest)
-        pressure_head = picture.head.values[:, 0]
-        if pressure_head.min() < 0 < pressure_head.max():
-            axes.tricontour(triangles, pressure_head, [0.0], colors=TABLE, linewidths=1.8)
+        segments = picture.table()
+        if len(segments):
+            draw_water_table(axes, segments)
             table = True
-        for line in picture.levels:
-            axes.plot(*line.T, color=TABLE, linewidth=1.8)
         axes.add_collection(LineCollection(picture.head.outline, colors="black", linewidths=0.8))
         axes.set_title(picture.name, loc="left", pad=3)
-        axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]), ylabel="$y$ [m]")
     panels[-1, 0].set_xlabel("$x$ [m]")
     if table:
-        panels[0, 0].legend(handles=[Line2D([], [], color=TABLE, linewidth=1.8, label="water table")], loc="lower right",
-                            bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, frameon=False, fontsize=8)  # fmt: skip
-    bar = figure.colorbar(
-        ScalarMappable(Normalize(*limits), quantity.colours), ax=panels[:, 0].tolist(), shrink=0.7, pad=0.01
-    )
+        water_legend(panels[0, 0])
+    bar = figure.colorbar(ScalarMappable(norm, colours), ax=panels[:, 0].tolist(), shrink=0.7, pad=0.01,
+                          extend="min" if least < limits[0] else "neither")  # fmt: skip
     bar.set_label(quantity.label)
     return figure
 

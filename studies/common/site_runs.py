@@ -16,10 +16,12 @@ from .checks import check_effect, say
 from .collapse_runs import UNDECIDED
 from .field_plots import bend, mechanism_field, save_convergence, save_curves, save_mechanism
 from .figures import Pictures
+from .page import Page
 from .results import open_results
 from .site_file import Site, cell_size_of, read_site
 from .slope_fem import finite_elements, step_line
 from .summary import write_summary
+from .water_table import level_line
 
 
 def add_site_option(parser: argparse.ArgumentParser) -> None:
@@ -83,25 +85,31 @@ def site_study(
         sure = "" if row["failure_shown"] else f", a lower bound only: {row['reason']}"
         cells = "mesh of the site" if row["cell_size_m"] is None else f"cells of {row['cell_size_m']:g} m"
         said.append(f"{cells}: {name.replace('_', ' ')} {row[name]:.3f}{sure}")
-    drawn = _drawn(folder, sizes, runs, label, site.axisymmetric, model)
-    write_summary(folder, a, summary, comm, pictures=drawn, said="\n".join(said))
+    drawn, value = _drawn(folder, sizes, runs, label, site, model), label.split(" [")[0]
+    captions = {"mechanism": "Mechanism on the finest mesh, with the soils and, where there is water, the water table",
+                "value_displacement": f"{value} over the largest displacement on the way to failure",
+                "convergence": f"{value} over the size of the cells"}  # fmt: skip
+    write_summary(folder, a, summary, comm, Page(captions=captions), drawn, "\n".join(said))
     return 0 if all(run.failed for run in runs) else UNDECIDED
 
 
 def _drawn(
-    folder: Path, sizes: list, runs: list[bridge.Collapse], label: str, half_section: bool, model: bridge.QuasiStatic
+    folder: Path, sizes: list, runs: list[bridge.Collapse], label: str, site: Site, model: bridge.QuasiStatic
 ) -> Pictures:
-    """Mechanism on the finest mesh, displacement over the value, and convergence. Collective."""
-    field = mechanism_field(runs[-1].mechanism, half_section, model.cell_tags, model.off)
+    """Mechanism on the finest mesh, the value over displacement, and convergence. Collective."""
+    field = mechanism_field(runs[-1].mechanism, site.axisymmetric, model.cell_tags, model.off)
+    wet = model.largest_pore_pressure() > 0
     if field is None:
         return {}
-    names = ["site" if size is None else f"{size:g} m" for size in sizes]
+    pressures = [stage.pore_pressure for stage in site.stages if stage.pore_pressure is not None]
+    table = level_line(pressures[-1], field.points.min(axis=0), field.points.max(axis=0)) if wet and pressures else None
+    names = ["mesh of the site" if size is None else f"cells of {size:g} m" for size in sizes]
     curves = {name: (1e3 * run.curve[:, 1], run.curve[:, 0]) for name, run in zip(names, runs)}
     wide, lowest = 1e3 * bend([run.curve for run in runs]), 0.98 * min(run.curve[0, 0] for run in runs)
     values, least = {"site": [run.value for run in runs]}, "" if runs[-1].failed else "of at least "
     title = f"{label.split(' [')[0]} {least}{runs[-1].value:.3f}"
     pictures: Pictures = {
-        "mechanism": lambda: save_mechanism(folder / "mechanism.png", field, title),
+        "mechanism": lambda: save_mechanism(folder / "mechanism.png", field, title, water=table),
         "value_displacement": lambda: save_curves(
             folder / "value_displacement.png", curves, ("Largest displacement [mm]", label), limits=((0, wide), (lowest, None))),
     }  # fmt: skip

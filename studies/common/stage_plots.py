@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from particle_player import axis_labels, boundary_edges
 from .field_plots import Field, gathered
 from .figures import Pictures, curve_figure, save_figure
 from .plots import CURVES, Quantity, paper_style
+from .water_table import draw_water_table, level_line, water_legend
 
 MOVED = Quantity("Displacement", "mm", scale=1e3, colours="viridis")
 SHEAR = Quantity("Accumulated deviatoric strain", "%", scale=1e2, colours="inferno")
@@ -31,12 +32,14 @@ class StagePicture:
     """A stage for pictures, on the first rank.
 
     displacement: at the corners of all cells [m]; there: of each cell; strain: accumulated deviatoric strain of each cell [-]
+    water: segments (k, 2, 2) [m] of the water table, none where the site is dry
     """
 
     name: str
     displacement: Field
     there: np.ndarray
     strain: np.ndarray
+    water: np.ndarray = field(default_factory=lambda: np.empty((0, 2, 2)))
 
     def field(self) -> Field:
         """The displacement on the cells that are there."""
@@ -51,12 +54,14 @@ class StagePicture:
 def stage_picture(site: bridge.FemSite, name: str) -> StagePicture | None:
     """The site as it is now; None but on the first rank. Collective."""
     fem, comm = site.fem, site.fem.domain.comm
-    field = gathered(fem.displacement, fem.geometry == bridge.Geometry.AXISYMMETRIC)
+    moved, pressure = gathered(fem.displacement, fem.geometry == bridge.Geometry.AXISYMMETRIC), site.state.pore_pressure
     parts = comm.gather(tuple(values[:, 0] for values in own_cell_values(fem)))
-    if field is None or parts is None:
+    if moved is None or parts is None:
         return None
     material, strain = (np.concatenate(arrays) for arrays in zip(*parts))
-    return StagePicture(name, field, material >= 0, strain)
+    box = moved.points.min(axis=0), moved.points.max(axis=0)
+    water = {"water": level_line(pressure, *box)} if pressure else {}
+    return StagePicture(name, moved, material >= 0, strain, **water)
 
 
 def own_cell_values(fem: bridge.QuasiStatic) -> list[np.ndarray]:
@@ -87,7 +92,11 @@ def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) 
             axes.add_collection(LineCollection(outline, colors="black", linewidths=0.7))
             axes.set_title(f"Stage: {stage.name}", loc="left", pad=3)
             axes.set(aspect="equal", xlim=box[:, 0], ylim=box[:, 1], ylabel=up)
+            if len(stage.water):
+                draw_water_table(axes, stage.water)
         panels[-1, 0].set_xlabel(along)
+        if any(len(stage.water) for stage in stages):
+            water_legend(panels[0, 0])
         bar = figure.colorbar(ScalarMappable(Normalize(*limits), quantity.colours), ax=panels[:, 0].tolist(), shrink=0.6,
                               extend="max", pad=0.01)  # fmt: skip
         bar.set_label(quantity.label)

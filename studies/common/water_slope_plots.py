@@ -15,21 +15,29 @@ from .water_site import DAY, time_in_words
 from .water_slopes import Instant, lowest
 
 CAPTIONS = {
-    "pore_pressure": "Pore pressure, negative where it is suction, with flow lines, the water table and standing water (blue)",
+    "pore_pressure": "Pore pressure, negative (brown) where it is suction, with flow lines, the water table and standing water (blue)",
     "saturation": "Degree of saturation, with flow lines, the water table and standing water (blue)",
     "factor_of_safety": "Factor of safety over time",
-    "mechanism": "Mechanism in which the slope fails at the time of the lowest factor, its strength divided by the factor",
+    "mechanism": "Mechanism in which the slope fails at the time of the lowest factor, its strength divided by the factor, with the water "
+    "table (blue)",
 }
 
 
 def slope_pictures(
-    folder: Path, instants: Sequence[Instant], limits: Mapping[str, float], film: bool = True
+    folder: Path, instants: Sequence[Instant], limits: Mapping[str, float], soils: object, film: bool = True
 ) -> Pictures:
-    """Draw all pictures of a slope in time; limits: factors of safety by name, drawn as lines; film: of the flow too. Collective."""
+    """Draw all pictures of a slope in time. Collective.
+
+    Args:
+        limits: factors of safety by name, drawn as lines.
+        soils: tags of the cells of the slope, by name.
+        film: draw a film of the flow too.
+    """
     worst = lowest(list(instants))
-    field: Field | None = mechanism_field(worst.safety.mechanism)
-    if field is None:
+    field: Field | None = mechanism_field(worst.safety.mechanism, soils=soils)
+    if field is None or worst.picture is None:
         return {}
+    table = worst.picture.table()
     shown = [one.picture for one in _chosen(instants, worst) if one.picture is not None]
     moving = [one.picture for one in instants if one.picture is not None]
     title = f"{time_in_words(worst.time)}: factor of safety {worst.safety.value:.2f}"
@@ -39,7 +47,7 @@ def slope_pictures(
         **({"flow": lambda: save_flow_film(folder / "flow", moving, PRESSURE)} if film else {}),
         "pore_pressure": lambda: save_flow(folder / "pore_pressure.png", shown, PRESSURE),
         "factor_of_safety": lambda: save_factors(folder / "factor_of_safety.png", instants, limits),
-        "mechanism": lambda: save_mechanism(folder / "mechanism.png", field, title),
+        "mechanism": lambda: save_mechanism(folder / "mechanism.png", field, title, water=table),
     }
 
 

@@ -77,6 +77,6 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
         lines.append(
             "the lowest factor is below these limits, which are no bounds while water still flows from other parts of the slope"
         )
-    drawn = (slope_pictures(folder, instants, values, a.film) | pictures) if a.pictures else {}
+    drawn = (slope_pictures(folder, instants, values, slope.body[1], a.film) | pictures) if a.pictures else {}
     early = write_summary(folder, a, summary, comm, page, drawn, said="\n".join(lines))
     return early or code or (0 if shown else UNDECIDED)

@@ -6,7 +6,8 @@ from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
 import fenics_bridge as bridge
-from studies.common.field_plots import gathered, mechanism_field, soil_borders
+from studies.common.field_plots import gathered, mechanism_field
+from studies.common.soil_outlines import soil_outlines
 from studies.common.stage_plots import StagePicture
 
 
@@ -48,9 +49,11 @@ def test_borders_of_soils_are_the_sides_around_them(tmp_path):
     tags = np.where(middle[:, 1] > 0.5, np.where(middle[:, 0] > 0.5, 3, 2), 1).astype(np.int32)
     soils = meshtags(domain, 2, np.arange(len(tags), dtype=np.int32), tags)
     bridge.name_tags(soils, {"clay": 1, "sand": (2, 3)})
-    edges = np.diff(soil_borders(domain, soils), axis=1)[:, 0]
+    lengths = {name: np.linalg.norm(np.diff(edges, axis=1)[:, 0], axis=1).sum()
+               for name, edges in soil_outlines(domain, soils).items()}  # fmt: skip
     # Each soil is 1 m by 0.5 m, and the border between the classes of sand is none
-    assert np.linalg.norm(edges, axis=1).sum() == pytest.approx(6.0)
+    assert lengths == pytest.approx({"clay": 3.0, "sand": 3.0})
+    assert list(soil_outlines(domain, soils, off=[2, 3])) == ["clay"]
 
 
 def test_a_mechanism_is_not_shown_where_the_soil_was_dug_away():
@@ -66,8 +69,8 @@ def test_a_mechanism_is_not_shown_where_the_soil_was_dug_away():
     assert np.allclose(
         corners.mean(axis=0), ground.reshape(-1, 2).mean(axis=0)
     )  # the middle of the cells that are there
-    lengths = [np.linalg.norm(np.diff(edges, axis=1)) for edges in (left.borders, soil_borders(domain, soils, [2]))]
-    assert lengths[0] == lengths[1] and len(left.borders) < len(whole.borders)
+    assert list(whole.soils) == ["ground", "cut"] and list(left.soils) == ["ground"]
+    assert np.array_equal(left.soils["ground"], whole.soils["ground"])
 
 
 def test_displacements_of_a_stage_are_those_of_its_points():
