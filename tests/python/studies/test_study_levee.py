@@ -3,8 +3,12 @@
 import importlib
 import json
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.collections import LineCollection
+from matplotlib.quiver import Quiver
+from matplotlib.tri import Triangulation
 from study_main import ended
 
 SMALL = [
@@ -69,6 +73,35 @@ def test_the_ground_settles_as_its_water_flows_off(of, tmp_path):
     assert history["pore_pressure_ratio_free_field"][-1] < 0.1
     assert summary["crest_settlement_m"] > summary["crest_settlement_at_end_of_motion_m"]
     assert abs(summary["unexplained_energy_fraction"]) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("largest", "times"), [(0.2, 10.0), (0.21, 5.0), (0.5, 2.0), (1.9, 1.0), (30.0, 1.0), (0.0, 1.0), (2e-3, 1000.0)]
+)
+def test_displacements_are_enlarged_to_a_thirtieth_of_the_width_at_most(largest, times):
+    assert importlib.import_module("common.levee_plots").enlargement(largest, 60.0) == times  # a thirtieth is 2 m
+
+
+def test_displacements_are_drawn_beside_the_outline_before(monkeypatch):
+    """A block of 40 m by 10 m that moves as a whole by (0.3, -0.1) m: drawn four times as far, rounded down to twice as far."""
+    plots, figures = importlib.import_module("common.levee_plots"), []
+    monkeypatch.setattr(plots, "save_figure", lambda figure, path: figures.append(figure))
+    x, y = np.meshgrid(np.linspace(0, 40, 11), np.linspace(-10, 0, 4))
+    triangles = Triangulation(x.ravel(), y.ravel())
+    points, cells = np.column_stack([triangles.x, triangles.y]), triangles.triangles
+    moved = np.array([0.3, -0.1])
+    frame = {"time": 8.0, "mesh_corners": points[cells].reshape(-1, 6), "moved": np.tile(moved, (len(cells), 1))}
+    plots.save_displacement(None, frame)
+    axes = figures[0].axes[0]
+    after, before = (np.array(one.get_segments()) for one in axes.collections if isinstance(one, LineCollection))
+    assert np.linalg.norm(np.diff(before, axis=1)[:, 0], axis=1).sum() == pytest.approx(100.0)  # no gap within
+    assert np.allclose(after - before, 2 * moved) and "enlarged 2 times" in axes.get_title(loc="left")
+    arrows = next(one for one in axes.collections if isinstance(one, Quiver))
+    assert np.allclose(arrows.U, 0.3) and np.allclose(arrows.V, -0.1) and 40 < len(arrows.U) <= 44
+    (low, high), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    tips = arrows.XY + np.column_stack([arrows.U, arrows.V]) / arrows.scale
+    assert np.all((tips > (low, bottom)) & (tips < (high, top)))
+    plt.close(figures[0])
 
 
 def test_the_levee_has_the_strength_of_its_options():
