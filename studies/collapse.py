@@ -11,9 +11,10 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
+from common.collapse_runs import CAPTIONS, CollapseRuns, Target, add_flow_options, dilation_angles
 from common.figures import Pictures
 from common.options import check, study_parser
+from common.page import Page
 from common.ranks import run_study
 from common.results import open_results
 from common.site_runs import add_site_option, check_site_options, site_study
@@ -128,7 +129,7 @@ def main(arguments: list[str] | None = None) -> int:
         f"limit analysis: {spiral.unit_weight / 1e3:.2f} kN/m3 with associated flow, {davis_unit_weight(a) / 1e3:.2f} "
         f"with Davis' reduced strength without dilation\n{outside_line(a, spiral.curve)}{found.lines()}"
     )
-    write_summary(folder, a, summary, comm, pictures=drawn(found, spiral, folder), said=said)
+    write_summary(folder, a, summary, comm, Page(captions=CAPTIONS), drawn(found, spiral, folder), said)
     return found.exit_code()
 
 

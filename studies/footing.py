@@ -12,9 +12,10 @@ from time import perf_counter
 
 import numpy as np
 from common.checks import check_cells
-from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
+from common.collapse_runs import CAPTIONS, CollapseRuns, Target, add_flow_options, dilation_angles
 from common.figures import Pictures
 from common.options import add_count, add_number, check, study_parser
+from common.page import Page
 from common.ranks import run_study
 from common.results import ROOT, open_results
 from common.slope_case import soil_of
@@ -166,7 +167,7 @@ def main(arguments: list[str] | None = None) -> int:
         "wall_seconds": perf_counter() - start,
     }
     said = f"Prandtl: Nc = {found.target.reference:.3f}\n{found.lines()}"
-    write_summary(folder, a, summary, comm, pictures=drawn(a, found, folder), said=said)
+    write_summary(folder, a, summary, comm, Page(captions=CAPTIONS), drawn(a, found, folder), said)
     return found.exit_code()
 
 

@@ -15,9 +15,10 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from common.collapse_runs import CollapseRuns, Target, add_flow_options, dilation_angles
+from common.collapse_runs import CAPTIONS, CollapseRuns, Target, add_flow_options, dilation_angles
 from common.figures import Pictures
 from common.options import add_flag, add_number, check, study_parser
+from common.page import Page
 from common.ranks import run_study
 from common.results import open_results
 from common.site_file import Site
@@ -280,7 +281,7 @@ def main(arguments: list[str] | None = None) -> int:
     line = slip_line(a, limit)
     outside = "" if line is None else outside_line(a, line)
     said = f"limit analysis, associated flow: {limit:.3f}\n{outside}{found.lines()}"
-    write_summary(folder, a, summary, comm, pictures=drawn(a, found, line, folder), said=said)
+    write_summary(folder, a, summary, comm, Page(captions=CAPTIONS), drawn(a, found, line, folder), said)
     return found.exit_code()
 
 

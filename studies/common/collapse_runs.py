@@ -17,6 +17,15 @@ from .options import add_switch
 
 UNDECIDED = 3
 """Exit code of a study that found a lower bound, but no failure above it"""
+CAPTIONS = {
+    "mechanism": "Mechanism on the finest mesh: displacement and shear strain of the last increment, with the slip line of limit analysis",
+    "mechanism_without_dilation": "Mechanism without dilation",
+    "factor_displacement": "Factor that divides the strength over the largest displacement on the way to failure",
+    "load_displacement": "Unit weight over the largest displacement on the way to collapse",
+    "load_settlement": "Pressure over the settlement of the footing's centre on the way to collapse",
+    "convergence": "Result over the size of the cells, beside limit analysis",
+}  # fmt: skip
+"""Of the pictures of `CollapseRuns`"""
 
 
 def add_flow_options(parser: ArgumentParser) -> None:
