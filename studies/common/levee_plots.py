@@ -87,9 +87,13 @@ def _means_at_points(cells: np.ndarray, values: np.ndarray, count: int) -> np.nd
 
 def enlargement(largest: float, width: float) -> float:
     """How many times displacements are enlarged so that the largest is up to a thirtieth of the width: 1, 2, 5, 10, 20, ..."""
-    wanted = width / 30 / largest if largest > 0 else 1.0
-    steps = np.outer(10.0 ** np.arange(6), (1, 2, 5)).ravel()
-    return float(steps[max(0, np.searchsorted(steps, wanted, side="right") - 1)])
+    return max(1.0, round_below(width / 30 / largest)) if largest > 0 else 1.0
+
+
+def round_below(value: float) -> float:
+    """The largest number 1, 2 or 5 times a power of ten that is not above a positive value."""
+    power = 10.0 ** np.floor(np.log10(value) + 1e-9)
+    return float(power * max(k for k in (1, 2, 5) if k * power <= value * (1 + 1e-9)))
 
 
 def _spacing(points: np.ndarray) -> float:
@@ -109,5 +113,5 @@ def _arrows(axes: Axes, points: np.ndarray, moved: np.ndarray, longer: float, la
     nodes = nodes[np.linalg.norm(moved[nodes], axis=1) > 0.08 * largest]
     arrows = axes.quiver(*points[nodes].T, *moved[nodes].T, angles="xy", scale_units="xy", scale=1 / longer, width=0.0026,
                          color="white", edgecolor="#202020", linewidth=0.4, zorder=4)  # fmt: skip
-    key = 0.5 * largest
-    axes.quiverkey(arrows, 0.91, 1.055, key, f"{key:.3g} m", labelpos="E", fontproperties={"size": 8})
+    key = round_below(0.8 * largest)
+    axes.quiverkey(arrows, 0.91, 1.055, key, f"{key:g} m", labelpos="E", fontproperties={"size": 8})

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Colormap, ListedColormap, Normalize
@@ -28,6 +29,8 @@ from .water_table import draw_water_table, polyline_segments, water_legend, zero
 HEAD = Quantity("Total head", "m", colours="viridis")
 PRESSURE = Quantity("Pore pressure", "kPa", scale=1e-3, colours="BrBG")
 SATURATION = Quantity("Degree of saturation", "-", colours="viridis")
+LIGHT, DARK = ("white", "#404040"), ("#303030", "white")
+"""Flow lines on dark and on light colours: their own, and that around them"""
 MODERATE = 50.0
 """Suction [kPa] that a scale of pore pressures shows, where there is so much"""
 
@@ -168,7 +171,7 @@ def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[n
         axes.tricontourf(triangles, values, levels, cmap=colours, norm=norm, extend="both")
         if np.any((lines > values.min()) & (lines < values.max())):  # matplotlib warns of none
             axes.tricontour(triangles, values, lines, colors="black", linewidths=0.35, alpha=0.6)
-        _flow_lines(axes, triangles, picture, (low, high), fastest)
+        _flow_lines(axes, triangles, picture, (low, high), fastest, DARK if quantity is PRESSURE else LIGHT)
         segments = picture.table()
         if len(segments):
             draw_water_table(axes, segments)
@@ -184,10 +187,13 @@ def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[n
     return figure
 
 
-def _flow_lines(axes, triangles: Triangulation, picture: FlowPicture, box: tuple, fastest: float) -> None:
+def _flow_lines(
+    axes: Axes, triangles: Triangulation, picture: FlowPicture, box: tuple, fastest: float, look: tuple[str, str]
+) -> None:
     """Flow lines through the saturated soil, where water moves at all.
 
     fastest: velocity in all pictures [m/s]; a millionth of it is round-off in water at rest
+    look: colours of the lines and of what surrounds them
     """
     low, high = box
     x, y = (np.linspace(a, b, n) for a, b, n in zip(low, high, (240, 120)))
@@ -198,6 +204,6 @@ def _flow_lines(axes, triangles: Triangulation, picture: FlowPicture, box: tuple
     if not speed.max() > 1e-6 * fastest:
         return
     still = speed.mask | (speed.filled(0) < 1e-4 * speed.max()) | (p.filled(-1) < 0)
-    drawn = axes.streamplot(x, y, np.ma.array(u, mask=still), np.ma.array(v, mask=still), color="white", linewidth=0.6,
+    drawn = axes.streamplot(x, y, np.ma.array(u, mask=still), np.ma.array(v, mask=still), color=look[0], linewidth=0.6,
                             density=0.9, arrowsize=0.6)  # fmt: skip
-    drawn.lines.set_path_effects([withStroke(linewidth=1.5, foreground="#404040")])  # white alone is lost on yellow
+    drawn.lines.set_path_effects([withStroke(linewidth=1.5, foreground=look[1])])  # one colour alone is lost somewhere
