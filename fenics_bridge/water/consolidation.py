@@ -153,6 +153,8 @@ class Consolidation(ConsolidationResults):
         self._active, self._inflow = (np.zeros(len(self.pressure.x.array), dtype=kind) for kind in (bool, float))
         self.motion: Motion | None = None
         """Velocity and acceleration; None in quasi-static steps"""
+        self.named_coarse_cells = False
+        """Whether `run` has warned of cells at a drained boundary that are too large for its first step"""
         self._assemble(options_prefix, inertia)
         self._external = self._loads.forces(Load())
         warn_of_laws(self, "Element.TAYLOR_HOOD hardly locks")
@@ -331,7 +333,8 @@ class Consolidation(ConsolidationResults):
     ) -> list[ConsolidationReport]:
         """Make steps up to a time, each longer than the one before while Newton's method converges quickly. Collective.
 
-        A step that fails is halved.
+        A step that fails is halved. Warns once of cells at a drained boundary under a load that are larger than sqrt(c_v first_step),
+        with c_v = k M / gamma_w: settlements in the first steps are then too large.
 
         Args:
             until: time at the end [s].

@@ -8,6 +8,7 @@ from typing import Any
 from mpm_core.step_control import StepControl
 
 from fenics_bridge.errors import agree, is_finite
+from fenics_bridge.water.drainage import warn_of_coarse_cells
 
 SHORTEST = 1e-4
 """Step, over the first one, below which a run gives up."""
@@ -18,6 +19,8 @@ def run(
 ) -> list[Any]:
     """Do what `Consolidation.run` says."""
     agree(model.domain.comm, _mistake(until, model.time, first_step, growth, longest))
+    if model.motion is None and not model.named_coarse_cells:
+        model.named_coarse_cells = warn_of_coarse_cells(model, min(first_step, longest))
     reports, control = [], StepControl(longest, min(first_step, longest))
     while model.time < until * (1 - 1e-12) and control.length >= SHORTEST * first_step:
         step = min(control.length, until - model.time)

@@ -12,6 +12,7 @@ OPTIONS = {
     "integration=PARTICLES": "--integration particles",
     "second_order=True": "--second-order",
     "a smaller start": "a smaller --start",
+    "a longer first_step": "a longer --first-step",
     "more steps of relaxation (max_steps of Solver), a tolerance as in practice (PRACTICE)": "--equilibrium practice",
 }
 """Words of the library, and those of studies that have the option in them"""

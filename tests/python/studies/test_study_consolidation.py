@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from consolidation_cases import layer_settled
 from mpi4py import MPI
-from study_main import main
+from study_main import ended, main
 
 from mpm_core import InputError
 
@@ -29,6 +29,7 @@ SITE = (STUDIES.parent / "meshes" / "fill.toml").read_text()
         ('axis = "roller"', 'axis = "slides"', "supports.axis is 'slides'"),
         ("[10.0, 20e3]", "[0.0, 20e3]", "pressures.footing: day 0 comes after day 0, .*rising days"),
         ("[10.0, 20e3]", "[10.0, nan]", "pressures.footing is .*expected finite numbers"),
+        ("[10.0, 20e3]", "[10.0, -20e3]", "pressures.footing is -20000 Pa, expected at least 0: a pressure pushes"),
         ("[10.0, 20e3]", "[10.0]", "pressures.footing is .*expected a number or rows"),
         ("footing = [[0.0, 0.0]", "nowhere = [[0.0, 0.0]", "no facet has the name 'nowhere'"),
         ("middle = [0.0, 0.0]", "middle = [0.0]", r"points.middle is .*expected \[x, y\]"),
@@ -50,6 +51,27 @@ def test_a_wrong_site_is_named(old, new, words, tmp_path):
     path.write_text(SITE.replace(old, new).replace('"footing.geo"', f'"{STUDIES.parent}/meshes/footing.geo"'))
     with pytest.raises(InputError, match=words):
         read_consolidation_site(path, MPI.COMM_SELF).at_rest(water.Element.STABILISED)
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        ("conductivity = 1e-9", "conductivity = [1e-9, 8.64]", "soils.soil: conductivity is 8.64 m/s, more than that of gravel"),
+        ("[boundaries.footing]\nreservoir = 0.5", "[boundaries.footing]\nreservoir = [[0.0, 0.5], [1.0, 100.0]]",
+         "the reservoir of 'footing' is 100 m, 100 m above the top of the mesh, which is 6 m high"),
+        ("[boundaries.footing]\nreservoir = 0.5", "[boundaries.footing]\nreservoir = 18.0", ""),  # deep water
+    ],
+)  # fmt: skip
+def test_values_that_are_probably_mistakes_are_said(old, new, words, tmp_path):
+    from common.consolidation_site import read_consolidation_site
+
+    assert old in SITE
+    path = tmp_path / "site.toml"
+    path.write_text(SITE.replace(old, new).replace('"footing.geo"', f'"{STUDIES.parent}/meshes/footing.geo"'))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        read_consolidation_site(path, MPI.COMM_SELF, 2.0)
+    assert len(caught) == bool(words) and all(words in str(one.message) for one in caught)
 
 
 RAMP = "footing = [[0.0, 0.0], [10.0, 20e3]]"
@@ -90,6 +112,18 @@ def test_ground_in_which_nothing_changes_is_said(pressure, words, tmp_path, with
     assert (abs(settled) < 1e-9) == bool(words)
 
 
+@pytest.mark.parametrize("options, words", [([], 0), (["--first-step", 0.25], 1)])
+def test_cells_that_are_too_large_for_the_first_step_are_said(options, words, tmp_path, without_pictures):
+    """The cells of 0.15 m under the fill are 0.13 m high, by which soil consolidates in the half day of the first step."""
+    import consolidation
+    from common.option_words import in_options
+
+    run = ended("consolidation", tmp_path, "--days", 2, "--no-film", *options)
+    assert run.returncode == 0
+    assert run.stderr.count("the cells at the drained boundary 'footing'") == words
+    assert in_options(run.stderr, consolidation.parser()).count("Take a longer --first-step, 0.") == words
+
+
 def test_particles_take_no_other_water_than_reservoirs(tmp_path):
     from common.consolidation_site import read_consolidation_site
 
@@ -114,7 +148,7 @@ def test_particles_begin_at_rest(dilation, nmd, tmp_path):
 
     path = tmp_path / "site.toml"
     site = SITE.replace("friction_angle = 25.0", f"friction_angle = 25.0\ndilation_angle = {dilation}")
-    site = site.replace("[[0.0, 0.0], [10.0, 20e3]]", "0.0").replace("cell_size = 0.25", "cell_size = 1.0")
+    site = site.replace("[[0.0, 0.0], [10.0, 20e3]]", "0.0").replace("cell_size = 0.15", "cell_size = 1.0")
     path.write_text(site.replace('"footing.geo"', f'"{STUDIES.parent}/meshes/footing.geo"'))
     ground = read_consolidation_site(path, MPI.COMM_SELF)
     fem = ground.at_rest(water.Element.STABILISED, nmd)
@@ -299,6 +333,7 @@ def test_stages_that_particles_cannot_follow_are_named(change, stage, words, tmp
         ("footing=1:2:3", "--pressures is 'footing=1:2:3'"),
         ("footing=0:0,5", "--pressures is 'footing=0:0,5'"),
         ("footing=5:0,5:1e3", "--pressures footing: day 5 comes after day 5, expected .* rising days"),
+        ("footing=-20e3", "--pressures footing is -20000 Pa, expected at least 0: a pressure pushes"),
         ("footing=0:inf", "--pressures.footing is .*expected finite numbers"),
     ],
 )

@@ -1,0 +1,153 @@
+"""A warning of cells at drained boundaries that are too large for the first step of a consolidation.
+
+In a step dt water leaves a layer of the thickness sqrt(c_v dt), c_v = k M / gamma_w, at a drained boundary. Cells have one linear
+pressure, which is that of the boundary at one end, so that a larger cell gives off the water of all of its height: in Terzaghi's layer
+settlements of cells twice as high as this length are 7 to 20 % too large in the first step with quadratic displacements and twice as
+large with linear ones, and some 5 % too large in the second to tenth step. With cells as high as this length no more is left than the error of
+backward Euler. Vermeer and Verruijt (1981) have the bound h^2 / (6 theta c_v), below which pressures oscillate; six times that is asked for here.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenics_bridge import compat
+from fenics_bridge.mesh.tagged import owned_cells
+from fenics_bridge.water.boundary import Flux
+from fenics_bridge.water.retention import AlwaysSaturated
+
+if TYPE_CHECKING:
+    from fenics_bridge.water.consolidation import Consolidation
+
+NOTHING = 1e-6
+"""Change of a load, over all loads, that is round-off"""
+
+FEW = 0.05
+"""Fraction of the load at drained boundaries below which a boundary is left out"""
+
+DAY = 86400.0
+
+
+class _Cells(NamedTuple):
+    """Cells of this rank, (n,) each, with a facet at a drained boundary."""
+
+    cells: NDArray[np.int_]
+    """Their numbers"""
+    areas: NDArray[np.float64]
+    """Of the facets [m], [m2] in space"""
+    heights: NDArray[np.float64]
+    """Across the facets [m]"""
+    diffusivity: NDArray[np.float64]
+    """c_v along the normal of the facets [m2/s]"""
+
+
+def warn_of_coarse_cells(model: Consolidation, first_step: float) -> bool:
+    """Warn where cells at drained boundaries that are loaded are too large for the first step of a run [s]; returns whether it does.
+
+    Soil without a stiffness before its first load, and soil that may dry, is left out. Collective.
+    """
+    model._take_boundary()
+    text = _coarse_cells(model, first_step)
+    if text and model.domain.comm.rank == 0:
+        warnings.warn(text, RuntimeWarning, stacklevel=5)
+    return bool(text)
+
+
+def _coarse_cells(model: Any, dt: float) -> str:
+    """What the warning says; empty where cells are small enough, or nothing changes in this step."""
+    comm, end = model.domain.comm, model.time + dt
+    coming = _forces_to_come(model, end)
+    if coming is None:
+        return ""
+    diffusivity, drained = _diffusivity(model), _drained(model, end)
+    found = [_beside(model, diffusivity, held.dofs[drained[held.dofs]]) for held in model._applied.held]
+    sums = np.zeros((2, len(found), 3))  # by load and by area: weight, and with it height and length
+    for k, at in enumerate(found):
+        values = np.array([np.ones(len(at.cells)), at.heights, np.sqrt(dt * at.diffusivity)])
+        sums[:, k] = values @ coming[at.cells], values @ at.areas
+    by_load, by_area = comm.allreduce(sums)
+    loaded = by_load[:, 0].sum() > NOTHING * comm.allreduce(float(coming.sum()))
+    weight, height, length = (by_load if loaded else by_area).T
+    counts = weight > FEW * weight.sum()
+    ratios = np.divide(height, length, out=np.zeros_like(height), where=counts & (length > 0))
+    if not len(ratios) or ratios.max() <= 1.0:
+        return ""
+    worst = int(ratios.argmax())
+    return _text(model._applied.held[worst].condition.facet_tag, height[worst] / weight[worst], ratios[worst], dt)
+
+
+def _text(tag: int | str, height: float, ratio: float, dt: float) -> str:
+    needed, small = dt * ratio**2, -_up(-height / ratio)
+    return (
+        f"the cells at the drained boundary {tag!r} are {height:.2g} m high, more than the sqrt(c_v dt) = {small:.2g} m that consolidate in "
+        f"the first step of {dt / DAY:.2g} days: settlements soon after a change of the load are too large. Take a longer first_step, "
+        f"{_up(needed / DAY):.2g} days ({_up(needed):.2g} s), or cells of {small:.2g} m there (docs/water.md)"
+    )
+
+
+def _up(value: float) -> float:
+    """The next number above that has two digits."""
+    digit = 10.0 ** (np.floor(np.log10(abs(value))) - 1)
+    return float(np.ceil(value / digit - 1e-9) * digit)
+
+
+def _forces_to_come(model: Any, end: float) -> NDArray[np.float64] | None:
+    """Sum of the nodal forces of each cell of this rank that a step brings, (m,); None where it brings none. Collective."""
+    (space, dofs), domain, body = model._displacements, model.domain, model._body
+    external, before = model._external_at(end), body.increment.x.array.copy()
+    body.increment.x.array[:] = 0.0
+    forces = external - body.kinematics.internal_forces(model.points.stress).array
+    body.increment.x.array[:] = before
+    forces[model._supports.dofs] = 0.0
+    here = forces[dofs].reshape(-1, domain.geometry.dim)
+    sizes = np.abs(np.array([here, np.reshape(external[dofs], here.shape)])).sum(axis=(1, 2))
+    change, whole = domain.comm.allreduce(sizes)
+    if change <= NOTHING * whole:
+        return None
+    of_cells = np.linalg.norm(here, axis=1)[compat.cell_dofs(space)[: owned_cells(domain)]]
+    return np.asarray(of_cells.sum(axis=1))
+
+
+def _diffusivity(model: Any) -> NDArray[np.float64]:
+    """Tensor of c_v of the cells of this rank [m2/s], (m, D, D); 0 in soil without one."""
+    points, dim, count = model.points, model.domain.geometry.dim, owned_cells(model.domain)
+    moduli = points.wave_moduli(model._laws)[:, 0].reshape(-1, points.per_cell)
+    modulus, tensors = np.zeros(count), np.zeros((count, dim, dim))
+    modulus[points.cells] = np.where(np.isfinite(moduli).all(axis=1), moduli.mean(axis=1), 0.0)
+    for soil, cells in zip(model._soils[0], model._soils[2]):
+        if isinstance(soil.retention, AlwaysSaturated):
+            tensors[cells[cells < count]] = soil.tensor(soil.conductivity, dim)
+    wet = model._wet.x.array[:count] > 0
+    return np.where(wet, modulus / model.water.unit_weight, 0.0)[:, None, None] * tensors
+
+
+def _drained(model: Any, end: float) -> NDArray[np.bool_]:
+    """Which dofs of the pressure have a given one at a time [s], or are where water leaves now."""
+    fixed, _, upper = model._applied.bounds(end)
+    full = model.pressure.x.array >= model.water.unit_weight * (upper - NOTHING)
+    fluxes = [held.dofs for held in model._applied.held if isinstance(held.condition, Flux)]
+    drained = fixed | (np.isfinite(upper) & full)
+    for dofs in fluxes:
+        drained[dofs] &= fixed[dofs]
+    return np.asarray(drained)
+
+
+def _beside(model: Any, diffusivity: NDArray[np.float64], dofs: NDArray[np.integer]) -> _Cells:
+    """The cells of this rank with a facet between these dofs of the pressure."""
+    space, dim, count = model._pressures[0], model.domain.geometry.dim, owned_cells(model.domain)
+    corners = compat.cell_dofs(space)[:count]
+    there = np.zeros(len(model.pressure.x.array), dtype=bool)
+    there[dofs] = True
+    cells = np.flatnonzero((there[corners].sum(axis=1) == dim) & (np.trace(diffusivity, axis1=1, axis2=2) > 0))
+    x = space.tabulate_dof_coordinates()[:, :dim][corners[cells]]
+    others = np.swapaxes(np.linalg.inv(x[:, 1:] - x[:, :1]), 1, 2)
+    gradients = np.concatenate([-others.sum(axis=1, keepdims=True), others], axis=1)  # of the shape functions
+    across = gradients[np.arange(len(cells)), np.argmin(there[corners[cells]], axis=1)]
+    heights = 1 / np.linalg.norm(across, axis=1)
+    normals = across * heights[:, None]
+    areas = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / (1 if dim == 2 else 2) / heights
+    return _Cells(cells, areas, heights, np.einsum("ci,cij,cj->c", normals, diffusivity[cells], normals))

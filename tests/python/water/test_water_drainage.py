@@ -1,0 +1,107 @@
+"""The warning of cells at a drained boundary that are too large for the first step: settlements are off with it and right without it."""
+
+import re
+import warnings
+
+import pytest
+from consolidation_cases import BASE, ELEMENTS, GRAVITY_OF_WATER, LEFT, RIGHT, TOP, Column, layer_settled
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import water
+
+CELLS = 20
+WARNING = "the cells at the drained boundary"
+
+
+def warned(run):
+    """How many warnings of large cells something gives, and the first of them."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        run()
+    texts = [str(one.message) for one in caught if WARNING in str(one.message)]
+    return len(texts), texts[0] if texts else ""
+
+
+def numbers(text):
+    """Height of cells [m], length [m] and first step [s] of a warning."""
+    found = re.search(r"are (\S+) m high, more than the sqrt\(c_v dt\) = (\S+) m .* days \((\S+) s\), or", text)
+    return [float(number) for number in found.groups()]
+
+
+def first_step(column, ratio):
+    """The step [s] in which a part of the column consolidates over which cells have this ratio: sqrt(c_v dt) = h / ratio."""
+    return column.period / (CELLS * ratio) ** 2
+
+
+@ELEMENTS
+@pytest.mark.parametrize("nmd", [False, True])
+@pytest.mark.parametrize("ratio", [0.5, 0.95, 2.5, 4.0])
+def test_settlements_are_off_where_the_warning_appears_and_right_elsewhere(element, nmd, ratio):
+    """The column settles by sqrt(4 T / pi) of the whole (Terzaghi): after three steps the error of backward Euler is below 5 %."""
+    if nmd and element is water.Element.TAYLOR_HOOD:
+        pytest.skip("quadratic elements have no averages")
+    column = Column(element, CELLS, nmd=nmd)
+    dt = first_step(column, ratio)
+    count, text = warned(lambda: column.model.run(5 * dt, dt, growth=1.0))
+    assert count == (ratio > 1)
+    fine = Column(element, 10 * CELLS, nmd=nmd, across=20)  # with the same steps, so that their error does not count
+    fine.model.run(dt, dt, growth=1.0)
+    coarse = Column(element, CELLS, nmd=nmd)
+    coarse.model.advance(dt)
+    assert (abs(coarse.settled() / fine.settled() - 1) > 0.2) == (ratio > 1)
+    if ratio < 1:
+        assert column.settled() == pytest.approx(layer_settled(5 * dt / column.period), rel=0.05)
+    else:
+        height, length, needed = numbers(text)
+        assert height == pytest.approx(1 / CELLS)
+        assert length == pytest.approx(height / ratio, rel=0.1) and length <= height / ratio
+        assert needed == pytest.approx(dt * ratio**2, rel=0.1) and needed >= dt * ratio**2
+
+
+@ELEMENTS
+def test_the_warning_comes_once_and_no_more_with_the_step_that_it_names(element):
+    column = Column(element, CELLS)
+    dt = first_step(column, 3.0)
+    count, text = warned(lambda: [column.model.run(time * dt, dt) for time in (2, 4, 8)])
+    assert count == 1
+    named = numbers(text)[2]
+    assert warned(lambda: Column(element, CELLS).model.run(3 * named, named)) == (0, "")
+
+
+def test_ground_on_which_no_load_comes_is_not_warned_of():
+    column = Column(water.Element.STABILISED, CELLS, load=0.0)
+    dt = first_step(column, 3.0)
+    column.model.initialise(column.stress_at_rest(), column._hydrostatic)
+    assert warned(lambda: column.model.run(2 * dt, dt)) == (0, "")
+    column.model.load = bridge.Load(unit_weight=GRAVITY_OF_WATER, pressure={TOP: 10e3})
+    assert warned(lambda: column.model.run(4 * dt, dt))[0] == 1
+
+
+def test_a_boundary_that_drains_elsewhere_than_under_the_load_counts():
+    column = Column(water.Element.STABILISED, CELLS, boundary=[water.Head(BASE, 1.0)])
+    dt = first_step(column, 3.0)
+    count, text = warned(lambda: column.model.run(2 * dt, dt))
+    assert count == 1 and f"boundary {BASE}" in text
+
+
+@pytest.mark.parametrize(
+    "soil, count",
+    [
+        (water.PorousSoil((1e-8, 1e-8)), 0),
+        (water.PorousSoil((1e-8, 1e-10)), 1),  # what flows along the boundary does not count
+        (water.PorousSoil((1e-8, 1e-10), retention=water.VanGenuchten(1e-5, 1.5)), 0),  # it may dry
+    ],
+)
+def test_the_conductivity_across_the_boundary_of_saturated_soil_counts(soil, count):
+    domain, _, facets = bridge.box_mesh(MPI.COMM_WORLD, (0.2, 1.0), (2, CELLS))
+    law = mpm.LinearElastic(young=10e6, poisson=0.3)
+    supports = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(BASE)]
+    model = water.Consolidation(
+        domain, law, soil, facets, supports, [water.Head(TOP, 1.0)], bridge.Load(pressure={TOP: 10e3}),
+        element=water.Element.STABILISED,
+    )  # fmt: skip
+    model.initialise(pore_pressure=lambda x: GRAVITY_OF_WATER * (1.0 - x[:, -1]))
+    dt = 1.1 * GRAVITY_OF_WATER / (1e-8 * law.p_wave_modulus) / CELLS**2
+    assert warned(lambda: model.run(2 * dt, dt))[0] == count
