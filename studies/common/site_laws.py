@@ -9,6 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from mpm_core.input_warnings import soft_water
+
 import mpm_core as mpm
 
 from .options import add_number, study_parser
@@ -86,13 +88,14 @@ LEAST = {"young": 1e5, "cohesion": 50.0, "shear_strength": 50.0}
 
 
 def unit_doubt(parameters: Mapping[str, Any], where: str) -> str:
-    """A warning of stiffness or strength in another unit than Pa; empty where there is no doubt, as for films that keep their volume."""
+    """A warning of stiffness, of soil or water, or strength in another unit than Pa; empty where there is no doubt, as for films that keep their volume."""
     for name, least in LEAST.items():
         value = parameters.get(name)
         fluid = name == "young" and is_number(parameters.get("poisson")) and parameters["poisson"] > 0.49
         if is_number(value) and 0 < value < least and not fluid:
             return f"{where}: {name} is {value:g} Pa, which hardly any soil has: stresses and moduli are in Pa, such as 10e3 for 10 kPa"
-    return ""
+    modulus = parameters.get("water_modulus")
+    return soft_water(f"{where}: water_modulus", modulus) if is_number(modulus) and modulus > 0 else ""
 
 
 def is_number(value: Any) -> bool:

@@ -1,4 +1,4 @@
-"""Warnings of single numbers that are probably in other units: weights, angles, rain, friction, water."""
+"""Warnings of single numbers that are probably in other units: weights, angles, rain, friction, water and its flow."""
 
 from __future__ import annotations
 
@@ -23,6 +23,12 @@ STEEPEST_FRICTION = 2.0
 ODD_WATER = (0.1, 200.0, 5000.0)
 """Densities [kg/m3] between the first two and above the last are probably those of water in other units, or under another gravity"""
 
+SOFTEST_WATER = 1e5
+"""Bulk modulus [Pa] of air under atmospheric pressure, below which that of pore water is more probably in other units"""
+
+LARGEST_CONDUCTIVITY = 1.0
+"""Conductivity [m/s] above which it is more probably in other units: coarse gravel has some 0.1 m/s"""
+
 HEAVIEST_RAIN = 1e-3
 """Rate [m/s] above which rain is more probably in other units: the heaviest minute on record, 38 mm, had 6.3e-4 m/s"""
 
@@ -37,6 +43,30 @@ def in_radians(name: str, angle: float) -> str:
     if not RADIANS[0] <= angle <= RADIANS[1]:
         return ""
     return f"{name} is {angle:g} degrees; angles are in degrees, and {angle:g} rad are {np.degrees(angle):.1f} degrees"
+
+
+def soft_water(name: str, modulus: float) -> str:
+    """What a warning says of a bulk modulus of water [Pa] that is probably in other units; empty for others."""
+    if not modulus < SOFTEST_WATER:
+        return ""
+    return f"{name} is {modulus:g} Pa, less than that of air; moduli are in Pa, 2.2e9 for water"
+
+
+def fast_flow(name: str, conductivity: float) -> str:
+    """What a warning says of a hydraulic conductivity [m/s] that is probably in other units; empty for others."""
+    if not conductivity > LARGEST_CONDUCTIVITY:
+        return ""
+    return (
+        f"{name} is {conductivity:g} m/s, more than that of gravel; conductivities are in m/s, such as 1e-5 for fine sand, and "
+        f"{conductivity:g} m/day are {conductivity / 86400.0:.3g} m/s"
+    )
+
+
+def warn_of_pores(comm: MPI.Comm, modulus: float, conductivity: float, stacklevel: int = 3) -> None:
+    """Warn of a modulus of water [Pa] and a conductivity [m/s] that are probably in other units. Not collective."""
+    for text in (soft_water("modulus", modulus), fast_flow("conductivity", conductivity)):
+        if comm.rank == 0 and text:
+            warnings.warn(text, RuntimeWarning, stacklevel=stacklevel)
 
 
 def warn_of_radians(**angles: float) -> None:

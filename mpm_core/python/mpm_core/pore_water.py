@@ -15,7 +15,7 @@ from .anisotropy import tensors_of_laws
 from .checks import at_points, real_numbers
 from .collective import collectively
 from .conditions import Conditions
-from .input_warnings import warn_of_rain, warn_of_water_density
+from .input_warnings import warn_of_pores, warn_of_rain, warn_of_water_density
 from .mesh import Tag, floats
 from .parameter_fields import Field
 from .particles import Particles
@@ -65,6 +65,8 @@ class PoreWater(Conditions):
 
         Stresses of the particles are then effective stresses, and their density is that of the saturated soil. Pore pressures
         begin at zero, see `set_pore_pressure`. A boundary without a condition is impervious, see `hold_pore_pressure`.
+
+        Warns of a density, modulus or conductivity that is probably in other units.
 
         Args:
             porosity: volume of the pores over that of the soil [-], in (0, 1); it follows the volume of the particles.
@@ -128,6 +130,7 @@ class PoreWater(Conditions):
         water, n, k, filled = collectively(self.comm, checked)
         is_moist = self.comm.allreduce(bool((filled < 1).any()) or len(self.particles.saturation) > 0, MPI.LOR)
         warn_of_water_density(self.comm, water.density)
+        warn_of_pores(self.comm, water.modulus, self.comm.allreduce(float(k.max(initial=0.0)), MPI.MAX))
         self._core.water = water
         self.particles.set("porosity", n)
         self.particles.set("conductivity", k)

@@ -79,6 +79,20 @@ def test_a_density_of_water_in_other_units_is_said(density):
         model_of().add_water(porosity=0.4, conductivity=1e-5, density=density)
 
 
+@pytest.mark.parametrize("modulus, conductivity, words", [
+    (2.2, 1e-5, ["modulus is 2.2 Pa, less than that of air; moduli are in Pa, 2.2e9 for water"]),  # GPa
+    (2.2e9, 8.64, ["conductivity is 8.64 m/s, more than that of gravel; .* 8.64 m/day are 0.0001 m/s"]),
+    (1e5, 1.0, []), (np.inf, 1e-12, []),
+])  # fmt: skip
+def test_a_modulus_of_water_and_a_conductivity_in_other_units_are_said(modulus, conductivity, words):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        model_of().add_water(porosity=0.4, conductivity=conductivity, modulus=modulus)
+    assert len(caught) == len(words) and all(one.filename == __file__ for one in caught)
+    for one, text in zip(caught, words):
+        assert re.match(text, str(one.message))
+
+
 @pytest.mark.parametrize("across", [0.0, 1.0])
 @pytest.mark.parametrize("water", ["held", "standing", "pressure"])
 def test_levels_of_water_under_tilted_gravity_are_warned_of(across, water):
