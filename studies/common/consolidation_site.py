@@ -35,6 +35,7 @@ from fenics_bridge.water.boundary import value_at
 
 from .consolidation_stages import GroundStage, Table, pressure_table, stages_of
 from .checks import say
+from .site_doubts import warn_of_reservoirs
 from .site_file import CHANGES, Site, part_of_mesh, site_of
 from .site_keys import DAY, changes_of
 from .slope_case import GRAVITY
@@ -238,6 +239,8 @@ def read_consolidation_site(
         if name not in mesh[2].names:
             raise mpm.InputError(f"--pressures names '{name}', expected some of {', '.join(mesh[2].names)}")
     stages = stages_of(rows, list(soils), boundary_of(table, path), f"{path}: stages")
+    conditions = {id(one): one for stage in stages for one in stage.boundary.values()}  # each once
+    warn_of_reservoirs(mesh[0], conditions.values(), path)
     given = {name: pressure_table(one, f"{path}: pressures.{name}") for name, one in table.get("pressures", {}).items()}
     points = {name: _point(given, f"{path}: points.{name}") for name, given in table["points"].items()}
     search = PointSearch(mesh[0], np.array(list(points.values())).reshape(-1, 2))

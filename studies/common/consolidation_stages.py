@@ -11,7 +11,7 @@ import numpy as np
 
 import mpm_core as mpm
 
-from .site_keys import DAY
+from .site_keys import DAY, require_push
 from .water_site import condition
 
 Table = tuple[tuple[float, float], ...]
@@ -40,7 +40,7 @@ def pressure_table(given: Any, where: str) -> Table:
         where: it stands, for messages.
 
     Raises:
-        InputError: another form, values that are not finite, or days that do not rise.
+        InputError: another form, values that are not finite or below 0, or days that do not rise.
     """
     rows = given if isinstance(given, list) else [[0.0, given]]
     try:
@@ -51,6 +51,7 @@ def pressure_table(given: Any, where: str) -> Table:
         raise mpm.InputError(f"{where} is {given!r}, expected a number or rows [days, Pa]")
     if not np.all(np.isfinite(table)):
         raise mpm.InputError(f"{where} is {given!r}, expected finite numbers")
+    require_push(float(table[:, 1].min()), where)
     late = np.flatnonzero(np.diff(table[:, 0]) <= 0)
     if len(late):
         first, second = table[late[0] : late[0] + 2, 0]

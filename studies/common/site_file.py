@@ -41,7 +41,8 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 from .checks import say
-from .site_keys import changes_of, part_of, read_site_table
+from .site_doubts import warn_of_depth
+from .site_keys import changes_of, part_of, read_site_table, require_push
 from .site_laws import is_number, law_at, law_keys, located, unit_doubt, unit_weight_of
 from .slope_case import GRAVITY
 
@@ -303,6 +304,9 @@ def _stage(given: dict, number: int, site: Site, laws: dict[str, Any], path: Pat
     for key in ("law", "unit_weight", "pressure", "support"):
         if not isinstance(given.get(key, {}), dict):
             raise mpm.InputError(f"{where}: {key} is {given[key]!r}, expected a table such as {key} = {{name = value}}")
+    for name, pressure in given.get("pressure", {}).items():
+        if is_number(pressure):  # others are named with the stages
+            require_push(pressure, f"{where}: pressure of {name!r}")
     reset = given.get("reset_displacement", False)
     if not isinstance(reset, bool):
         raise mpm.InputError(f"{where}: reset_displacement is {reset!r}, expected true or false")
@@ -326,13 +330,13 @@ def _stage(given: dict, number: int, site: Site, laws: dict[str, Any], path: Pat
         support=[_support(name, kind, f"{where}.support.{name}", site.domain, site.facet_tags)
                  for name, kind in given.get("support", {}).items()],
         release=given.get("release", ()),
-        pore_pressure=_water(given["water_level"], where) if "water_level" in given else None,
+        pore_pressure=_water(given["water_level"], where, site.domain) if "water_level" in given else None,
         reset_displacement=reset,
     )  # fmt: skip
 
 
-def _water(level: Any, where: str) -> Any:
-    """Pore pressures below a water level: a number, or points (x, level) of its surface."""
+def _water(level: Any, where: str, domain: Any) -> Any:
+    """Pore pressures below a water level: a number, or points (x, level) of its surface. Collective."""
     points = level if isinstance(level, list) else [[0.0, level]]
     good = points and all(
         isinstance(point, list) and len(point) == 2 and all(map(is_number, point)) for point in points
@@ -341,4 +345,5 @@ def _water(level: Any, where: str) -> Any:
         raise mpm.InputError(
             f"{where}: water_level is {level!r}, expected a number [m] or points [x, level] with x rising"
         )
+    warn_of_depth(domain, [height for _, height in points], f"{where}: water_level")
     return bridge.hydrostatic(np.array(level, dtype=float))

@@ -107,6 +107,15 @@ def _require_known(given: Any, known: Collection[str], where: str) -> None:
             raise mpm.InputError(f"{where}: {unknown_key(key, known)}")
 
 
+def require_push(pressure: float, where: str) -> None:
+    """Raise InputError for a pressure on the ground [Pa] below 0; where: it stands, for the message."""
+    if pressure < 0:
+        raise mpm.InputError(
+            f"{where} is {pressure:g} Pa, expected at least 0: a pressure pushes on the ground, and one below 0 would pull at it; "
+            "what is taken away is a pressure that falls, or soil that a stage digs away"
+        )
+
+
 def part_of(table: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:
     """The entries of a table that have one of some keys."""
     return {key: value for key, value in table.items() if key in keys}

@@ -30,6 +30,7 @@ import mpm_core as mpm
 from fenics_bridge import water
 
 from .checks import say
+from .site_doubts import warn_of_flow, warn_of_reservoirs
 from .site_file import Site, check_soils, part_of_mesh, site_mesh
 from .site_keys import CONDITIONS, CURVES, DAY, FLOW, UNDRAINED, changes_of, part_of, read_site_table
 
@@ -108,8 +109,9 @@ def read_water_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) 
     mesh = site_mesh(table, path, comm, cell_size)
     check_soils(table, path, mesh[1])
     wet = {name: soil for name, soil in soils.items() if soil is not None}
-    boundary = boundary_of(table, path)
-    return WaterSite(*part_of_mesh(mesh, wet), wet, list(boundary.values()), varies=bool(times_of(boundary.values())))
+    boundary, body = list(boundary_of(table, path).values()), part_of_mesh(mesh, wet)
+    warn_of_reservoirs(body[0], boundary, path)
+    return WaterSite(*body, wet, boundary, varies=bool(times_of(boundary)))
 
 
 def read_water_table(path: Path, needed: Sequence[str]) -> dict[str, Any]:
@@ -161,9 +163,11 @@ def porous_soil(given: dict, where: str) -> water.PorousSoil:
             parameters["conductivity"] = _of_strata(given["conductivity"], parameters.pop("dip"))
         if curves:
             parameters["retention"] = CURVES[curves[0]](**given[curves[0]])
-        return water.PorousSoil(**parameters)
+        soil = water.PorousSoil(**parameters)
     except (TypeError, mpm.InputError) as error:
         raise mpm.InputError(f"{where}: {error}") from None
+    warn_of_flow(soil, where)
+    return soil
 
 
 def _has_numbers(value: Any) -> bool:

@@ -176,6 +176,47 @@ def test_stiffness_and_strength_in_kilopascals_are_named(change, words, tmp_path
         read_site(written(tmp_path, change), MPI.COMM_WORLD, 3.0)
 
 
+@pytest.mark.parametrize("modulus, words", [(2.2, 1), (2.2e9, 0)])
+def test_a_modulus_of_the_water_in_gigapascals_is_named(modulus, words, tmp_path):
+    from common.site_file import read_site
+
+    change = "[soils.bank]", f"[soils.bank]\nundrained = true\nwater_modulus = {modulus}"
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        read_site(written(tmp_path, change), MPI.COMM_WORLD, 3.0)
+    text = "soils.bank: water_modulus is 2.2 Pa, less than that of air; moduli are in Pa"
+    assert sum(text in str(one.message) for one in said) == words
+
+
+@pytest.mark.parametrize(
+    "module, study, where",
+    [
+        ("site_file", "read_site", r"stages\[2\]: water_level"),
+        ("slope_site", "read_slope_site", "the reservoir of 'face'"),
+        ("water_site", "read_water_site", "the reservoir of 'face'"),
+    ],
+)
+@pytest.mark.parametrize("level, words", [(200.0, 1), (7.0, 0)])
+def test_water_far_above_the_ground_is_said(module, study, where, level, words, tmp_path):
+    read = getattr(importlib.import_module(f"common.{module}"), study)
+    changes = ("water_level = 7.0", f"water_level = {level}"), ("[0.0, 7.0]", f"[0.0, {level}]")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        read(written(tmp_path, *changes), MPI.COMM_WORLD, 3.0)
+    text = f"{where} is 200 m, 19[12] m above the top of the mesh, which is .* m high: levels are elevations"  # dike of 8 m, or air
+    assert sum(bool(re.search(text, str(one.message))) for one in said) == words
+
+
+def test_a_pressure_of_a_stage_that_pulls_is_refused(tmp_path):
+    from common.site_file import read_site
+
+    change = "water_level = 7.0", "water_level = 7.0\npressure = {crest = -10e3}"
+    with pytest.raises(
+        mpm.InputError, match=r"stages\[\d\]: pressure of 'crest' is -10000 Pa, expected at least 0: a pressure pushes"
+    ):
+        read_site(written(tmp_path, change), MPI.COMM_WORLD, 3.0)
+
+
 def test_a_run_on_several_meshes_warns_once(tmp_path):
     words = f"--site {ground_alone(tmp_path)} --cell-size 3 --meshes 2 --elements P1 --output {tmp_path}/results"
     with warnings.catch_warnings(record=True) as said:
