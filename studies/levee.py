@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from common.animation import save_animation
-from common.checks import check_cells, check_effect, check_two_cells
+from common.checks import check_cells, check_effect, check_two_cells, say
 from common.earthquake_plots import save_ground, save_record
 from common.earthquake_site import FIELDS, outcrop_motion
 from common.figures import Pictures
@@ -23,7 +23,7 @@ from common.followed import cells_near, mean_displacement, numbers_in
 from common.history import History
 from common.lengths import metres
 from common.levee_plots import save_displacement, save_liquefaction
-from common.levee_site import SOILS, damping_of, effective_pressure, loose_sand, model_in_equilibrium
+from common.levee_site import SOILS, damping_of, effective_pressure, model_in_equilibrium, too_loose, void_ratio_named
 from common.motion_options import add_motion_options, check_motion
 from common.motions import STEP, accelerations
 from common.movie import gathered, own_frame, particle_movie
@@ -93,7 +93,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
                 "--sand-depth", "--stiff-depth")  # fmt: skip
     check_motion(p, a)
     check_effect(p, a, a.conductivity is not None, ("--stiff-conductivity",), "--conductivity")
-    loose_sand(a)  # names what is wrong with its parameters
+    say(too_loose(a))  # and names what is wrong with the parameters of the sand
     return a
 
 
@@ -199,9 +199,10 @@ def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     record = outcrop_motion(a)
     folder = open_results(a, comm)
-    model = model_in_equilibrium(a, record[2])
     until = float(record[2].time[-1]) + a.rest
-    history, frames, report = shaken(a, model, until, folder)
+    with void_ratio_named(a):
+        model = model_in_equilibrium(a, record[2])
+        history, frames, report = shaken(a, model, until, folder)
     largest = {
         f"largest_pore_pressure_ratio_{place}": history[f"pore_pressure_ratio_{place}"].max() for place in PLACES
     }

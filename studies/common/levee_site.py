@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from mpi4py import MPI
@@ -36,6 +38,32 @@ MOIST = {"saturation": 0.5, "conductivity": 1e-9}
 def loose_sand(a: Namespace) -> mpm.Sanisand:
     """Toyoura sand, with what ``--sanisand`` changes of it."""
     return sanisand_of([f"void_ratio={a.void_ratio}", *a.sanisand])
+
+
+def too_loose(a: Namespace) -> str:
+    """A warning of sand without strength at critical state, towards which undrained sand shears; empty for denser sand."""
+    sand = loose_sand(a)
+    if sand.void_ratio < sand.critical_void_ratio:
+        return ""
+    return (
+        f"--void-ratio is {sand.void_ratio:g}, and the critical void ratio of the sand is {sand.critical_void_ratio:g} or less: as long as its "
+        "water does not drain, such sand loses all of its strength as it shears, and flows under the weight of the levee; lower --void-ratio"
+    )
+
+
+@contextmanager
+def void_ratio_named(a: Namespace) -> Iterator[None]:
+    """Let an error of the sand's law name the option that probably causes it."""
+    try:
+        yield
+    except mpm.RunError as error:
+        if mpm.Sanisand.__name__ not in str(error):
+            raise
+        sand = loose_sand(a)
+        raise mpm.RunError(
+            f"{error}; sand of this --void-ratio, {sand.void_ratio:g}, may be too loose to carry its load: lower it (its critical void ratio "
+            f"is {sand.critical_void_ratio:g} or less)"
+        ) from None
 
 
 def unit_weights(a: Namespace) -> dict[str, float]:

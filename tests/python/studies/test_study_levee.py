@@ -132,3 +132,18 @@ def test_the_levee_has_the_strength_of_its_options():
 def test_wrong_options_are_named(tmp_path, options, message):
     result = ended("levee", tmp_path, *options)
     assert result.returncode == 2 and message in result.stderr, result.stderr
+
+
+@pytest.mark.parametrize("void_ratio", ["1.6", "3.0"])
+def test_sand_that_fails_under_its_load_names_its_void_ratio(void_ratio, tmp_path):
+    """Above the critical void ratio of Toyoura sand without pressure, 0.934, undrained sand loses its strength."""
+    run = ended("levee", tmp_path, *SMALL, "--void-ratio", void_ratio)
+    assert run.returncode == 2
+    warning, error = run.stderr.strip().splitlines()[0], run.stderr.strip().splitlines()[-1]
+    assert f"--void-ratio is {float(void_ratio):g}, and the critical void ratio of the sand is 0.934" in warning
+    assert f"sand of this --void-ratio, {float(void_ratio):g}, may be too loose to carry its load: lower it" in error
+
+
+def test_sand_that_can_have_strength_is_not_warned_of():
+    levee, site = importlib.import_module("levee"), importlib.import_module("common.levee_site")
+    assert site.too_loose(levee.parser().parse_args(["--void-ratio", "0.93"])) == ""
