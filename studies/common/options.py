@@ -40,16 +40,18 @@ class Options(argparse.Namespace):
     """Options as parsed; ``vars`` gives their values, `parameters` also their units and meanings.
 
     ``given`` has the options that the command line names, ``--no-name`` where it says so. ``notes`` are those of the checkpoint
-    of ``--restart``, and ``restarts`` has a row for each time that the run went on from one; see ``checkpoint.py``.
+    of ``--restart``, and ``restarts`` has a row for each time that the run went on from one; see ``checkpoint.py``. ``unused`` has
+    the names in Python of those that a run leaves out, such as a run of a site the shape of the slope.
     """
 
-    __slots__ = ("actions", "description", "given", "study", "notes", "restarts")
+    __slots__ = ("actions", "description", "given", "study", "notes", "restarts", "unused")
     actions: list[argparse.Action]
     description: str
     given: set[str]
     study: str
     notes: Mapping[str, Any]
     restarts: list[dict[str, Any]]
+    unused: set[str]
 
     def parameters(self) -> list[Parameter]:
         """All options that say what is computed, with the values that are in force."""
@@ -78,7 +80,7 @@ class _Parser(argparse.ArgumentParser):
         options.actions, options.study = self._actions, self.prog.split()[-1]
         options.description = self.description or options.study
         options.given = {word.split("=")[0] for word in args if word[:2] == "--"}
-        options.notes, options.restarts = {}, []
+        options.notes, options.restarts, options.unused = {}, [], set()
         try:
             self._take_defaults_from_files(args, options)
         except ParameterError as error:

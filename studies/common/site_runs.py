@@ -41,7 +41,9 @@ def check_site_options(parser: argparse.ArgumentParser, options: Namespace, name
     others = [name for name in sorted(options.given) if name.replace("--no-", "--") not in kept]
     check_effect(parser, options, options.site is None, others, "no --site")
     if options.site is not None:
-        options.actions = [action for action in options.actions if kept.intersection(action.option_strings)]
+        used = [action for action in options.actions if kept.intersection(action.option_strings)]
+        options.unused = {action.dest for action in options.actions} - {action.dest for action in used}
+        options.actions = used
 
 
 def site_study(

@@ -31,7 +31,7 @@ def write_summary(
     pictures: Pictures | None = None,
     said: str | None = None,
 ) -> int:
-    """Write ``summary.json``: options, versions, number of ranks, date, and the results by their names; then pictures and page.
+    """Write ``summary.json``: options that the run uses, versions, number of ranks, date, and the results by their names; then pictures and page.
 
     The pictures come second, so that a full disk costs them and not the results. Everything goes to the page ``report.html``
     as well. Each file appears as a whole or not at all. Call it on every rank, when all tables are written; the first rank
@@ -65,8 +65,9 @@ def _write(
     folder: Path, options: Namespace, results: Mapping[str, object], comm: MPI.Comm, page: Page | None,
     pictures: Pictures,
 ) -> None:  # fmt: skip
+    unused = options.unused if isinstance(options, Options) else set()
     summary = {
-        "parameters": vars(options),
+        "parameters": {name: value for name, value in vars(options).items() if name not in unused},
         "versions": versions(),
         "ranks": comm.size,
         "machine": platform.machine(),

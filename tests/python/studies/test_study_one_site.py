@@ -304,10 +304,15 @@ def test_steps_that_apply_the_load_are_called_so(tmp_path, capsys):
 @pytest.mark.parametrize("study", ["collapse", "safety", "slope"])
 def test_parameters_of_a_run_of_a_site_have_its_options_only(study, tmp_path):
     from common.results import open_results
+    from common.summary import write_summary
 
     options = importlib.import_module(study).parse(["--site", str(DIKE), "--output", str(tmp_path / "results")])
     text = (open_results(options) / "parameters.toml").read_text()
     names = set(re.findall(r"^([a-z0-9-]+) = ", text, re.MULTILINE))
     assert "site" in names and not names & {"height", "angle", "cohesion", "unit-weight", "friction-angle", "depth"}
+    write_summary(tmp_path / "results", options, {})
+    summary = json.loads((tmp_path / "results" / "summary.json").read_text())
+    assert {name.replace("-", "_") for name in names} <= set(summary["parameters"])
+    assert not set(summary["parameters"]) & {"height", "angle", "cohesion", "unit_weight", "friction_angle", "depth"}
     again = importlib.import_module(study).parse(["--parameters", str(tmp_path / "results" / "parameters.toml")])
     assert again.site == DIKE and {one.name for one in again.parameters()} >= names
