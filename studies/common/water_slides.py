@@ -36,6 +36,9 @@ HOLDING = 0.9, 0.75, 0.6
 """Parts of the factor of safety by which the strength is divided in the equilibrium that particles take over: the first one with
 which linear cells, of averaged strains or without, stand"""
 
+COME_TO_REST = 0.1
+"""Of the largest displacement, that comes in the second half of a slide that ends at rest"""
+
 
 def add_optional_slide(parser: ArgumentParser) -> None:
     """Option ``--slide``, and those of the slide."""
@@ -75,7 +78,9 @@ def slide_of(
     unbalanced = model.out_of_balance(nmd=a.slide_water == "still" and averages(a, model.laws))
     with Interrupt(comm) as interrupt:
         result, stopped = slide(a, model, folder, interrupt, act, step)
-    moved = result.history["largest_displacement_m"][-1]
+    time, displacement = result.history["time_s"], result.history["largest_displacement_m"]
+    moved = displacement[-1]
+    rests = moved - np.interp(0.5 * time[-1], time, displacement) <= COME_TO_REST * moved
     if comm.rank == 0:
         print(f"slide from {time_in_words(instant.time)} on: largest displacement {metres(moved)} after "
               f"{result.history['time_s'][-1]:.3g} s")  # fmt: skip
@@ -83,6 +88,7 @@ def slide_of(
             print(f"the slide ended early: {stopped}", file=sys.stderr)
     summary = {
         "slide_from_days": instant.time / DAY, "slide_stopped_because": stopped, "largest_displacement_m": moved,
+        "slide_comes_to_rest": bool(rests),
         "initial_out_of_balance_ratio": max(handover.unbalanced_ratio, unbalanced),
         "newly_yielded_fraction": handover.yielded_fraction,
         "particles": comm.allreduce(len(model.particles)),

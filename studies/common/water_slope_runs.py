@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from time import perf_counter
+from typing import Any
 
+import numpy as np
 from mpi4py import MPI
+from mpm_core.law_warnings import locks_at_failure
 
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import water
 
 from .checks import say
+from .lengths import metres
 from .collapse_runs import UNDECIDED
 from .page import Page
 from .results import open_results
@@ -26,6 +30,9 @@ from .water_slopes import failure_time, follow, lowest
 
 comm = MPI.COMM_WORLD
 
+
+LITTLE = 0.01
+"""Of the height of the mesh, by which particles move that soon rest again"""
 
 Limits = Callable[[Namespace, SlopeSite, water.Seepage], dict[str, bridge.Collapse]]
 
@@ -77,6 +84,20 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
         lines.append(
             "the lowest factor is below these limits, which are no bounds while water still flows from other parts of the slope"
         )
+    lines += filter(None, [rests_all_the_same(a, slope, summary)])
     drawn = (slope_pictures(folder, instants, values, slope.body[1], a.film) | pictures) if a.pictures else {}
     early = write_summary(folder, a, summary, comm, page, drawn, said="\n".join(lines))
     return early or code or (0 if shown else UNDECIDED)
+
+
+def rests_all_the_same(a: Namespace, slope: SlopeSite, summary: Mapping[str, Any]) -> str:
+    """Why particles hardly slide where the factor of safety is below 1; empty where they slide, or have no other strength. Collective."""
+    heights = comm.allgather(slope.body[0].geometry.x[:, 1])
+    moved, height = summary.get("largest_displacement_m", np.inf), float(np.ptp(np.concatenate(heights)))
+    rests = summary.get("slide_comes_to_rest", False) and moved <= LITTLE * height
+    if not (rests and a.davis and locks_at_failure(slope.site.laws.values())):
+        return ""
+    return (
+        f"the particles rest again after {metres(moved)} although the factor of safety is below 1: they have the flow rule of the soil, with "
+        "which it is stronger than with the strength of Davis in the factor (--no-davis; docs/water.md)"
+    )

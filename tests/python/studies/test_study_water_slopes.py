@@ -96,8 +96,35 @@ def test_the_slide_begins_in_equilibrium_and_gathers_speed(water, tmp_path):
     assert summary["initial_out_of_balance_ratio"] < 1e-9 and summary["newly_yielded_fraction"] == 0.0
     moved = np.genfromtxt(tmp_path / "results" / "history.csv", delimiter=",", names=True)["largest_displacement_m"]
     assert moved[0] == 0.0 and np.all(np.diff(moved, 2) > 0) and moved[-1] > 0.1
+    assert not summary["slide_comes_to_rest"]
     drawn = {path.stem for path in (tmp_path / "results").iterdir()}
     assert "pore_pressure" in drawn and not drawn & {"flow", "slide"}  # these are films
+
+
+def test_a_slope_that_fails_with_the_strength_of_davis_only_says_why_its_particles_rest(tmp_path, capsys):
+    """After 1.5 days the factor by Davis is just below 1; with its own flow rule the soil carries some percent more."""
+    path = site("drawdown", tmp_path)
+    options = "--elements P2 --cell-size 1.6 --days 1.6 --slide --time 2 --frames 4 --no-pictures"
+    summary, _ = run("drawdown", path, tmp_path, options)
+    assert 0.9 < summary["last_factor_of_safety"] < 1 and summary["slide_comes_to_rest"]
+    words = "although the factor of safety is below 1: they have the flow rule of the soil, with which it is stronger"
+    assert words in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("change, said", [({}, True), ({"moved": 1.0}, False), ({"rests": False}, False), ({"davis": False}, False),
+                                          ({"dilation": 27.0}, False)])  # fmt: skip
+def test_only_particles_at_rest_that_are_stronger_than_davis_has_it_are_explained(change, said, tmp_path):
+    from argparse import Namespace
+
+    from common.slope_site import read_slope_site
+    from common.water_slope_runs import rests_all_the_same
+
+    case = {"moved": 0.01, "rests": True, "davis": True, "dilation": 0.0} | change
+    angle = f"friction_angle = 27.0\ndilation_angle = {case['dilation']}"
+    path = site("drawdown", tmp_path, ("friction_angle = 27.0", angle), ("friction_angle = 30.0", angle))
+    slope = read_slope_site(path, MPI.COMM_WORLD, 3.0)
+    summary = {"largest_displacement_m": case["moved"], "slide_comes_to_rest": case["rests"]}
+    assert bool(rests_all_the_same(Namespace(davis=case["davis"]), slope, summary)) == said
 
 
 def test_a_slope_that_stands_does_not_slide(tmp_path):
