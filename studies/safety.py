@@ -19,6 +19,7 @@ from common.collapse_runs import CAPTIONS, CollapseRuns, Target, add_flow_option
 from common.figures import Pictures
 from common.options import add_flag, add_number, check, study_parser
 from common.page import Page
+from common.quiet import NOT_REACHED, without_warning
 from common.ranks import run_study
 from common.results import open_results
 from common.site_file import Site
@@ -244,6 +245,7 @@ def drawn(a: Namespace, found: CollapseRuns, line: np.ndarray | None, folder: Pa
 # --- 4. All together -------------------------------------------------------------------------------------------------
 
 
+@without_warning(NOT_REACHED)  # said by the error of a factor of safety
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     if a.site is not None:

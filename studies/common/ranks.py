@@ -35,6 +35,18 @@ def end_all_on_error(comm: MPI.Comm = MPI.COMM_WORLD) -> None:
     sys.excepthook = end
 
 
+def shown_once(show: Callable[..., None]) -> Callable[..., None]:
+    """Let `warnings.showwarning` leave out what it has shown, also as a beginning: elements and particles warn alike."""
+    texts: list[str] = []
+
+    def show_new(text: Warning | str, *rest: Any, **more: Any) -> None:
+        if not any(earlier.startswith(str(text)) for earlier in texts):
+            texts.append(str(text))
+            show(text, *rest, **more)
+
+    return show_new
+
+
 class _Unheard(io.FileIO):
     """A standard stream that stays one when its reader has ended: a closed pipe or terminal, to which text is lost."""
 
@@ -77,6 +89,7 @@ def run_study(main: Callable[[], int], *expected: type[BaseException]) -> NoRetu
     parser_of_study = getattr(sys.modules[main.__module__], "parser", lambda: None)
     # The place in the source does not help a user.
     warnings.formatwarning = lambda text, *_, **__: f"warning: {in_options(str(text), parser_of_study())}\n"
+    warnings.showwarning = shown_once(warnings.showwarning)
     signal.signal(signal.SIGUSR1, signal.default_int_handler)  # by which `studies/run --ranks` hands Ctrl-C on
     try:
         code = main()

@@ -17,6 +17,7 @@ from .collapse_runs import UNDECIDED
 from .field_plots import bend, mechanism_field, save_convergence, save_curves, save_mechanism
 from .figures import Pictures
 from .page import Page
+from .quiet import NOT_REACHED, without_warning
 from .results import open_results
 from .site_file import Site, cell_size_of, read_site
 from .slope_fem import finite_elements, step_line
@@ -46,6 +47,7 @@ def check_site_options(parser: argparse.ArgumentParser, options: Namespace, name
         options.actions = used
 
 
+@without_warning(NOT_REACHED)  # said by the error of a factor of safety
 def site_study(
     a: Namespace,
     find: Callable[[Site, bridge.QuasiStatic, Callable], bridge.Collapse],

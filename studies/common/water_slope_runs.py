@@ -19,6 +19,7 @@ from .checks import say
 from .lengths import metres
 from .collapse_runs import UNDECIDED
 from .page import Page
+from .quiet import NOT_REACHED, without_warning
 from .results import open_results
 from .site_slides import CAPTIONS as SLIDE_CAPTIONS
 from .slope_site import SlopeSite, read_slope_site
@@ -37,6 +38,7 @@ LITTLE = 0.01
 Limits = Callable[[Namespace, SlopeSite, water.Seepage], dict[str, bridge.Collapse]]
 
 
+@without_warning(NOT_REACHED)  # said by the error of a factor of safety
 def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Reservoir], limits_of: Limits) -> int:
     """Carry out a study of a slope and its water; returns its exit code. Collective.
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
+from study_main import ended
 
 import mpm_core as mpm
 
@@ -215,6 +216,34 @@ def test_a_pressure_of_a_stage_that_pulls_is_refused(tmp_path):
         mpm.InputError, match=r"stages\[\d\]: pressure of 'crest' is -10000 Pa, expected at least 0: a pressure pushes"
     ):
         read_site(written(tmp_path, change), MPI.COMM_WORLD, 3.0)
+
+
+WEAK = ("cohesion = 10e3", "cohesion = 0.5e3"), ("friction_angle = 24.0", "friction_angle = 10.0")
+
+
+@pytest.mark.parametrize(
+    "study, options, words",
+    [
+        ("slope", "", "its soils carry"),
+        ("excavation", "", "has no equilibrium beyond"),
+        ("safety", "--start 3", "start: with the strength divided by 3.0 only"),
+        ("drawdown", "--start 3", "start: with the strength divided by 3.0 only"),
+    ],
+)
+def test_why_the_ground_fails_is_said_once(study, options, words, tmp_path):
+    run = ended(
+        study,
+        tmp_path / "results",
+        *SMALL[study].split(),
+        "--cell-size",
+        "3",
+        "--site",
+        written(tmp_path, *WEAK),
+        *options.split(),
+    )
+    assert run.returncode != 0 and words in run.stderr
+    assert run.stderr.count("a mechanism: ") + run.stderr.count("no equilibrium: ") <= 1
+    assert "the load was not reached" not in run.stderr
 
 
 def test_a_run_on_several_meshes_warns_once(tmp_path):

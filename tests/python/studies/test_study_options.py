@@ -164,6 +164,22 @@ def test_warnings_are_shown_without_their_place(tmp_path):
     assert done.stderr == "warning: soft\n"
 
 
+def test_a_warning_is_shown_once():
+    """Also the beginning of one that was shown, as particles warn of what elements did, with other words at the end."""
+    shown = []
+    show = importlib.import_module("common.ranks").shown_once(lambda text, *rest: shown.append((str(text), *rest)))
+    for text in (
+        "it locks; elements do",
+        "it locks",
+        RuntimeWarning("it locks; elements do"),
+        "elements do",
+        "it locks here",
+    ):
+        show(text, RuntimeWarning, "file.py", 1)
+    assert [text for text, *_ in shown] == ["it locks; elements do", "elements do", "it locks here"]
+    assert shown[0][1:] == (RuntimeWarning, "file.py", 1)
+
+
 @pytest.mark.parametrize("study, option", [("balance", "rebalance"), ("liquefaction", "runout-length")])
 def test_an_option_has_the_name_that_it_has_in_the_study_slope(study, option):
     options = {p.name: p for p in importlib.import_module(study).parser().parse_args([]).parameters()}
