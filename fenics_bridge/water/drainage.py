@@ -1,10 +1,10 @@
 """A warning of cells at drained boundaries that are too large for the first step of a consolidation.
 
 In a step dt water leaves a layer of the thickness sqrt(c_v dt), c_v = k M / gamma_w, at a drained boundary. Cells have one linear
-pressure, which is that of the boundary at one end, so that a larger cell gives off the water of all of its height: in Terzaghi's layer
-settlements of cells twice as high as this length are 7 to 20 % too large in the first step with quadratic displacements and twice as
-large with linear ones, and some 5 % too large in the second to tenth step. With cells as high as this length no more is left than the error of
-backward Euler. Vermeer and Verruijt (1981) have the bound h^2 / (6 theta c_v), below which pressures oscillate; six times that is asked for here.
+pressure, which is that of the boundary at one end, so that a larger cell gives off too much water: cells twice as high as this length
+let Terzaghi's layer settle by a fifth too much in the first step with quadratic displacements, and by twice as much with linear ones
+(docs/water.md). With cells as high as it the error is about that of backward Euler. Pressures do not oscillate in steps above the bound of
+Vermeer and Verruijt (1981), h^2 / (6 theta c_v); for settlements six times that is asked for here, theta being 1.
 """
 
 from __future__ import annotations
