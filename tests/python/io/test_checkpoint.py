@@ -62,12 +62,12 @@ def started(folder):
 
 
 def test_a_usable_checkpoint_is_there_whenever_the_run_is_killed(tmp_path):
-    # Fifty runs that do hardly anything but save, each killed at a moment of its own; five at a time.
+    # Twenty runs that do hardly anything but save, each killed at a moment of its own; four at a time.
     random.seed(1)
     model = column((8, 8))
     struck = 0  # runs that were killed while they wrote
-    for batch in range(10):
-        folders = [tmp_path / f"{batch}_{k}" for k in range(5)]
+    for batch in range(5):
+        folders = [tmp_path / f"{batch}_{k}" for k in range(4)]
         children = [started(folder) for folder in folders]
         for child in children:
             assert child.stdout.readline() == "saved\n"
@@ -82,7 +82,7 @@ def test_a_usable_checkpoint_is_there_whenever_the_run_is_killed(tmp_path):
             assert model.time > 0
             model.save(folder / "state.h5")  # what is left of the last try is no obstacle
             assert not (folder / "state.h5.part").exists()
-    assert struck > 5
+    assert struck > 2
 
 
 def test_a_full_disk_is_named_and_the_last_checkpoint_stays(small_disk):

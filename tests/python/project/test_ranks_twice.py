@@ -63,9 +63,9 @@ if comm.rank == 0:
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    """What two runs on 4 ranks found."""
+    """What two runs on 3 ranks found."""
     root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    launch = ["mpirun", "-n", "4", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1"]
+    launch = ["mpirun", "-n", "3", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1"]
     files = [tmp_path_factory.mktemp("twice") / f"{number}.npz" for number in range(2)]
     for file in files:
         run = subprocess.run([*launch, sys.executable, "-c", PROGRAM, str(file)], capture_output=True, text=True,
