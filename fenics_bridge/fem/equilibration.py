@@ -38,21 +38,31 @@ class EquilibriumReport:
     reason: str
     """Why there is no equilibrium; empty otherwise"""
     iterations: int
-    """Linear systems solved"""
+    """Linear systems solved, or explicit steps made"""
     relaxation: Relaxation | None = None
     """The relaxation; None where Newton's method sufficed"""
     motion: NDArray[np.float64] | None = field(default=None, repr=False)
     """Displacement of the step, or of the mechanism where it fails, per degree of freedom [m]"""
+    explicit: bool = False
+    """Whether the iterations are explicit steps of particles"""
 
     def __repr__(self) -> str:
+        count = f"{self.iterations} {'explicit steps' if self.explicit else 'linear systems'}"
         balance = f", out-of-balance ratio {self.residuals[-1]:.2g}" if self.residuals else ""
         why = f": {self.reason}" if self.reason else ""
-        return f"<EquilibriumReport: {self.outcome} after {self.iterations} linear systems{balance}{why}>"
+        return f"<EquilibriumReport: {self.outcome} after {count}{balance}{why}>"
 
     @property
     def converged(self) -> bool:
         """Whether the step ended in equilibrium."""
         return self.outcome == "equilibrium"
+
+    @property
+    def method(self) -> str:
+        """What the iterations are, in a word for messages: Newton, relaxed or explicit."""
+        if self.explicit:
+            return "explicit"
+        return "Newton" if self.relaxation is None else "relaxed"
 
     @property
     def carried(self) -> float:
@@ -68,7 +78,7 @@ class EquilibriumReport:
     @property
     def easy(self) -> bool:
         """Whether Newton's method converged in a few iterations."""
-        return self.converged and self.relaxation is None and self.iterations <= EASY_ITERATIONS
+        return self.converged and self.method == "Newton" and self.iterations <= EASY_ITERATIONS
 
 
 def find_equilibrium(

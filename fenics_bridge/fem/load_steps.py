@@ -131,8 +131,8 @@ def _below_failure(value: float, failed_at: float, carried: float) -> float:
 def print_step(step: LoadStep) -> None:
     """Print a line on a load step to standard error, from rank 0.
 
-    It gives the number of the step, the value by its name and its change, the linear systems solved, the last residual, and the
-    outcome.
+    It gives the number of the step, the value by its name and its change, the linear systems solved or explicit steps made, the last
+    residual, and the outcome.
 
     Args:
         step: the load step.
@@ -140,12 +140,11 @@ def print_step(step: LoadStep) -> None:
     if MPI.COMM_WORLD.rank != 0:
         return
     report = step.report
-    method = "Newton" if report.relaxation is None else "relaxed"
     why = report.reason if np.isnan(report.carried) else f"the stresses carry {report.carried:.2%} of the load"
     state = {"equilibrium": "ok", "failure": f"fails: {why}"}.get(report.outcome, f"undecided ({report.reason})")
     print(
         f"step {step.number:3d}  {step.quantity} {step.value:<12.6g} size {step.size:<10.3g} "
-        f"{method} {report.iterations:2d}  residual {report.residuals[-1]:.1e}  {state}",
+        f"{report.method} {report.iterations:2d}  residual {report.residuals[-1]:.1e}  {state}",
         file=sys.stderr,
         flush=True,
     )

@@ -152,24 +152,27 @@ def _follow(model: Any, damping: float, rest: float, nmd: bool) -> Any:
     period, settlement = _scales(model)
     residuals, moved = [1.0], [0.0]
     steps_before = model.steps
+
+    def ended(outcome: str, reason: str = "") -> Any:
+        return EquilibriumReport(outcome, residuals, reason, model.steps - steps_before, explicit=True), moved[-1]
+
     for look in range(1, LAST_LOOK + 1):
         try:
             report = model.explicit(model.time + period, damping=damping, nmd=nmd).last()
         except mpm.RunError as error:
-            return EquilibriumReport("undecided", residuals, str(error), model.steps - steps_before), moved[-1]
+            return ended("undecided", str(error))
         residuals.append(report.unbalanced_ratio)
         moved.append(_largest_displacement(model))
-        iterations = model.steps - steps_before
         if report.is_quasi_static(rest):
-            return EquilibriumReport("equilibrium", residuals, "", iterations), moved[-1]
+            return ended("equilibrium")
         if look >= FIRST_LOOK and moved[-1] > GROWTH * settlement and _flows(moved):
             reason = (
                 f"the particles flow: after {model.time:.3g} s one has moved by {moved[-1]:.3g} m, ever faster, under an "
                 f"out-of-balance force of {residuals[-1]:.1e}"
             )
-            return EquilibriumReport("failure", residuals, reason, iterations), moved[-1]
+            return ended("failure", reason)
     reason = f"the particles neither rest nor flow after {model.time:.3g} s: out of balance by {residuals[-1]:.1e}"
-    return EquilibriumReport("undecided", residuals, reason, iterations), moved[-1]
+    return ended("undecided", reason)
 
 
 def _flows(moved: list[float]) -> bool:

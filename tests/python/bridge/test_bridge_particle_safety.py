@@ -41,13 +41,15 @@ def particles(law, gravity=GRAVITY, geometry=None):
         (25.0, 0.0, 1e3, bridge.Geometry.AXISYMMETRIC),
     ],
 )
-def test_particles_have_the_factor_of_the_finite_elements(friction_angle, dilation_angle, cohesion, geometry):
+def test_particles_have_the_factor_of_the_finite_elements(friction_angle, dilation_angle, cohesion, geometry, capsys):
     """On the same linear cells, whose particles hardly move: the brackets, at most 1 % wide, overlap within 1 %."""
     law = soil(friction_angle, dilation_angle, cohesion)
     body, _, facet_tags = bridge.soil_mesh(*MESH)
     model = bridge.QuasiStatic(body, law, facet_tags, SUPPORTS, degree=1, geometry=geometry)
     elements = bridge.factor_of_safety(model, bridge.Load(unit_weight=UNIT_WEIGHT), first_step=0.2)
-    found = bridge.particle_safety(particles(law, geometry=geometry), start=0.7)
+    found = bridge.particle_safety(particles(law, geometry=geometry), start=0.7, progress=bridge.print_step)
+    printed = capsys.readouterr().err.splitlines()
+    assert printed and all(" explicit " in line for line in printed)
     assert elements.failed and found.failed and found.residual <= 1e-3
     assert found.value <= 1.01 * elements.failed_at and elements.value <= 1.01 * found.failed_at
     assert found.failed_at - found.value <= 2 * 5e-3 * found.value
