@@ -3,32 +3,41 @@
 #include "materials/laws/point_moduli.h"
 
 #include <algorithm>
-#include <cmath>
+#include <numeric>
 
 namespace mpm::materials
 {
 namespace
 {
-int stiffness_class(const Law& law)
+double p_wave_modulus(const Law& law)
 {
   constexpr double reference_pressure = 100e3;
   const std::vector<double> initial_state(static_cast<std::size_t>(n_state(law)));
-  const double modulus = moduli_of_point(law, -reference_pressure, initial_state).p_wave;
-  return static_cast<int>(std::floor(std::log(modulus) / std::log(width_of_class)));
+  return moduli_of_point(law, -reference_pressure, initial_state).p_wave;
 }
 } // namespace
 
 std::vector<int> stiffness_groups(std::span<const Law> laws)
 {
-  std::vector<int> groups;
+  std::vector<double> moduli;
   for (const Law& law : laws)
-    groups.push_back(stiffness_class(law));
-  std::vector<int> classes = groups;
-  std::ranges::sort(classes);
-  const auto repeated = std::ranges::unique(classes);
-  classes.erase(repeated.begin(), repeated.end());
-  for (int& group : groups)
-    group = static_cast<int>(std::ranges::lower_bound(classes, group) - classes.begin());
+    moduli.push_back(p_wave_modulus(law));
+  std::vector<std::size_t> by_stiffness(laws.size());
+  std::iota(by_stiffness.begin(), by_stiffness.end(), std::size_t{0});
+  std::ranges::sort(by_stiffness, {}, [&](std::size_t law) { return moduli[law]; });
+  std::vector<int> groups(laws.size());
+  double softest = 0, last = 0; // moduli of the present group
+  int group = -1;
+  for (std::size_t law : by_stiffness)
+  {
+    if (!(moduli[law] <= largest_step_in_group * last && moduli[law] <= largest_range_of_group * softest))
+    {
+      ++group;
+      softest = moduli[law];
+    }
+    last = moduli[law];
+    groups[law] = group;
+  }
   return groups;
 }
 } // namespace mpm::materials

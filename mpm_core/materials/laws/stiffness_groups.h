@@ -9,15 +9,19 @@
 
 namespace mpm::materials
 {
-/// Largest P-wave modulus of a class of stiffness over its least one.
-inline constexpr double width_of_class = 1.25;
+/// P-wave modulus of a soil over that of the next softer one of its group, at most.
+inline constexpr double largest_step_in_group = 1.25;
 
-/// Groups laws by classes of stiffness, which are bounded by powers of `width_of_class` in Pa.
+/// P-wave modulus of the stiffest soil of a group over that of the softest one, at most.
+inline constexpr double largest_range_of_group = 4;
+
+/// Groups laws by their stiffness.
 ///
 /// Equilibrium gives soils of different stiffness different strains where they meet. A mean over both would strain the
-/// stiff soil by what the soft one yields, and give it too large a stress; so these are averaged apart. Soils of a
-/// class are averaged together, so that a seam of a row of cells is not the stiffer for its own name. The class of a
-/// law depends on nothing else, so that elements and particles with other lists of laws average alike.
+/// stiff soil by what the soft one yields, and give it too large a stress; so these are averaged apart. Soils whose
+/// stiffness rises in small steps are averaged together, as the rows of ground that becomes stiffer with depth: what a
+/// row gets from the softer one above it loses to the stiffer one below, and rows averaged by themselves would lock.
+/// A group ends where its range would be large, since soils at its ends may meet as well.
 ///
 /// The stiffness is that at a mean effective stress of 100 kPa where it depends on it, of the soil without the pore
 /// water, or in undrained soil with it.

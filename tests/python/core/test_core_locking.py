@@ -88,12 +88,13 @@ def elastic_of(p_wave_modulus):
     return mpm.LinearElastic(young=p_wave_modulus * 1.3 * 0.4 / 0.7, poisson=0.3)
 
 
-def test_soils_are_averaged_together_while_their_stiffness_is_of_one_class():
-    bounds = 1.25 ** np.arange(60, 90)  # [Pa]
-    within, above = elastic_of(1.2 * bounds[2]), elastic_of(1.01 * bounds[3])
-    laws = [elastic_of(1.01 * bounds[2]), above, within, elastic_of(2e9), above]
-    assert _core.stiffness_groups(laws) == [0, 1, 0, 2, 1]
-    assert _core.stiffness_groups([laws[3], within]) == [1, 0]  # whatever other laws there are
+def test_soils_are_averaged_together_while_their_stiffness_rises_in_small_steps():
+    graded = [elastic_of(5e6 * 1.2**k) for k in range(12)]
+    assert _core.stiffness_groups(graded) == [0] * 8 + [1] * 4  # 1.2^7 < 4 < 1.2^8
+    soft, next_one, stiff = elastic_of(5e6), elastic_of(6e6), elastic_of(7.6e6)
+    laws = [stiff, soft, stiff, next_one]
+    assert _core.stiffness_groups(laws) == [1, 0, 1, 0]
+    assert _core.stiffness_groups([*laws, elastic_of(7e6)]) == [0] * 5  # 5, 6, 7, 7.6
     # The water makes undrained soils alike, of whatever skeleton; sand counts at 100 kPa, whatever pressure it may reach.
     undrained = [mpm.Undrained(law, water_modulus=2e9, porosity=0.4) for law in laws[:3]]
     assert _core.stiffness_groups(undrained) == [0] * 3

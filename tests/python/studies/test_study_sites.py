@@ -256,3 +256,15 @@ def test_earlier_results_stay_where_the_site_has_a_mistake(tmp_path, study):
     with pytest.raises(mpm.InputError):
         importlib.import_module(study).main(["--site", str(path), "--output", str(folder), "--overwrite"])
     assert [file.name for file in folder.iterdir()] == ["summary.json"]
+
+
+def test_rows_of_ground_that_stiffens_with_depth_are_averaged_together():
+    """Averaged by themselves, rows of clay lock: the factor of linear elements on cells of 1 m was 9 % above that of quadratic ones."""
+    found = {}
+    for degree in (1, 2):
+        site = site_file.read_site(ROOT / "meshes" / "embankment.toml", MPI.COMM_WORLD, 1.0)
+        stiffness = {law.young for law in site.laws.values() if law.friction_angle == 0}
+        assert len(stiffness) > 1
+        fem = site.finite_elements(degree=degree, nmd=degree == 1)
+        found[degree] = bridge.factor_of_safety(fem, site.load(), start=1.0, tolerance=5e-3).value
+    assert found[1] == pytest.approx(found[2], rel=0.04)
