@@ -24,7 +24,10 @@ if TYPE_CHECKING:
     from fenics_bridge.water.consolidation import Consolidation
 
 NOTHING = 1e-6
-"""Change of a load, over all loads, that is round-off"""
+"""Part of the load that is round-off [-], and height by which a pressure may miss its bound [m]"""
+
+BALANCED = 1e-5
+"""Change of the forces, over all forces, that an equilibrium may leave (`Solver.relaxed_tolerance`); more with a coarser tolerance"""
 
 FEW = 0.05
 """Fraction of the load at drained boundaries below which a boundary is left out"""
@@ -49,11 +52,15 @@ def warn_of_coarse_cells(model: Consolidation, first_step: float) -> bool:
     """Warn where cells at drained boundaries that are loaded are too large for the first step of a run [s]; returns whether it does.
 
     Soil without a stiffness before its first load, and soil that may dry, is left out. Collective.
+
+    Raises:
+        InputError: a load or boundary condition is not possible at the end of the step. Raised on all ranks alike.
     """
     model._take_boundary()
+    model._applied.require_values(model.time + first_step)
     text = _coarse_cells(model, first_step)
     if text and model.domain.comm.rank == 0:
-        warnings.warn(text, RuntimeWarning, stacklevel=5)
+        warnings.warn(text, RuntimeWarning, stacklevel=4)  # where `run` is called
     return bool(text)
 
 
@@ -96,9 +103,13 @@ def _up(value: float) -> float:
 
 
 def _forces_to_come(model: Any, end: float) -> NDArray[np.float64] | None:
-    """Sum of the nodal forces of each cell of this rank that a step brings, (m,); None where it brings none. Collective."""
+    """Sum of the nodal forces of each cell of this rank that a step brings, (m,); None where it brings none. Collective.
+
+    Standing water that rises or falls does not count: the pores follow it at once, as its pressure on the soil does.
+    """
     (space, dofs), domain, body = model._displacements, model.domain, model._body
-    external, before = model._external_at(end), body.increment.x.array.copy()
+    standing, before = model._reservoirs, body.increment.x.array.copy()
+    external = model._external_at(end) - standing.forces(end) + standing.forces(model.time)
     body.increment.x.array[:] = 0.0
     forces = external - body.kinematics.internal_forces(model.points.stress).array
     body.increment.x.array[:] = before
@@ -106,7 +117,7 @@ def _forces_to_come(model: Any, end: float) -> NDArray[np.float64] | None:
     here = forces[dofs].reshape(-1, domain.geometry.dim)
     sizes = np.abs(np.array([here, np.reshape(external[dofs], here.shape)])).sum(axis=(1, 2))
     change, whole = domain.comm.allreduce(sizes)
-    if change <= NOTHING * whole:
+    if change <= max(BALANCED, model.solver.tolerance) * whole:
         return None
     of_cells = np.linalg.norm(here, axis=1)[compat.cell_dofs(space)[: owned_cells(domain)]]
     return np.asarray(of_cells.sum(axis=1))

@@ -20,7 +20,7 @@ def run(
     """Do what `Consolidation.run` says."""
     agree(model.domain.comm, _mistake(until, model.time, first_step, growth, longest))
     if model.motion is None and not model.named_coarse_cells:
-        model.named_coarse_cells = warn_of_coarse_cells(model, min(first_step, longest))
+        model.named_coarse_cells = warn_of_coarse_cells(model, min(first_step, longest, until - model.time))
     reports, control = [], StepControl(longest, min(first_step, longest))
     while model.time < until * (1 - 1e-12) and control.length >= SHORTEST * first_step:
         step = min(control.length, until - model.time)

@@ -3,8 +3,10 @@
 import re
 import warnings
 
+import numpy as np
 import pytest
 from consolidation_cases import BASE, ELEMENTS, GRAVITY_OF_WATER, LEFT, RIGHT, TOP, Column, layer_settled
+from dolfinx.mesh import compute_midpoints, meshtags
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -105,3 +107,69 @@ def test_the_conductivity_across_the_boundary_of_saturated_soil_counts(soil, cou
     model.initialise(pore_pressure=lambda x: GRAVITY_OF_WATER * (1.0 - x[:, -1]))
     dt = 1.1 * GRAVITY_OF_WATER / (1e-8 * law.p_wave_modulus) / CELLS**2
     assert warned(lambda: model.run(2 * dt, dt))[0] == count
+
+
+def test_the_warning_points_to_the_line_that_runs():
+    column = Column(water.Element.STABILISED, CELLS)
+    dt = first_step(column, 3.0)
+
+    def run():
+        column.model.run(dt, dt)
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        run()
+    assert [(one.filename, one.lineno) for one in caught] == [(__file__, run.__code__.co_firstlineno + 1)]
+
+
+@ELEMENTS
+@pytest.mark.parametrize("load", [0.0, 10e3])
+def test_water_that_rises_over_level_ground_is_not_warned_of_as_the_ground_does_not_settle(element, load):
+    level = lambda t: 3.0 + t
+    column = Column(element, CELLS, boundary=[water.Reservoir(TOP, level)], load=load)
+    column.model.initialise(pore_pressure=lambda x: GRAVITY_OF_WATER * (3.0 - x[:, -1]))
+    dt = first_step(column, 3.0)
+    assert warned(lambda: column.model.run(dt, dt))[0] == (load > 0)
+    moved = abs(column.model.displacement.x.array).max()
+    assert (moved > 1e-6) if load else (moved < 1e-12)
+
+
+def test_the_first_step_of_a_run_that_ends_sooner_counts():
+    column = Column(water.Element.STABILISED, CELLS)
+    load, dt = column.model.load, first_step(column, 3.0)
+
+    def until_the_end(time):
+        assert time <= dt, "a load is asked for at times of its steps only"
+        return load
+
+    column.model.load = until_the_end
+    count, text = warned(lambda: column.model.run(dt, 100 * dt))
+    assert count == 1 and numbers(text)[1] == pytest.approx(1 / CELLS / 3.0, rel=0.1)
+
+
+@pytest.mark.parametrize("level", [float("nan"), None, "high"])
+def test_a_level_that_is_none_is_refused_before_cells_are_looked_at(level):
+    column = Column(water.Element.STABILISED, CELLS, boundary=[water.Head(TOP, lambda t: level if t > 0 else 1.0)])
+    with warnings.catch_warnings(), pytest.raises(mpm.InputError, match="level is a function that returns"):
+        warnings.simplefilter("error")
+        column.model.run(2.0, 1.0)
+
+
+@pytest.mark.parametrize("more", [0.0, 1e3])
+def test_what_an_equilibrium_of_a_coarse_tolerance_leaves_is_no_load(more):
+    domain, _, facets = bridge.box_mesh(MPI.COMM_WORLD, (4.0, 2.0), (40, 20))
+    middle = compute_midpoints(domain, 1, facets.indices)
+    under = meshtags(domain, 1, facets.indices, np.where((facets.values == TOP) & (middle[:, 0] < 1), 9, facets.values))
+    law = mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=1e3, friction_angle=20.0, dilation_angle=0.0)
+    supports = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(BASE)]
+    weight = 18e3 - GRAVITY_OF_WATER
+    model = water.Consolidation(
+        domain, law, water.PorousSoil(1e-8), under, supports, [water.Head(tag, 2.0) for tag in (TOP, 9)],
+        bridge.Load(unit_weight=18e3, pressure={9: 9e3}), water.Element.STABILISED, solver=bridge.Solver(tolerance=1e-4),
+    )  # fmt: skip
+    at_rest = bridge.k0_stress(model.points.coordinates(), surface=2.0, unit_weight=weight, k0=0.6)
+    model.initialise(at_rest, lambda x: GRAVITY_OF_WATER * (2.0 - x[:, 1]))
+    short = (0.1 / 3.0) ** 2 * GRAVITY_OF_WATER / (1e-8 * law.p_wave_modulus)
+    assert warned(lambda: model.run(200 * short, 50 * short)) == (0, "")
+    model.load = bridge.Load(unit_weight=18e3, pressure={9: 9e3 + more})
+    assert warned(lambda: model.run(201 * short, short))[0] == (more > 0)
