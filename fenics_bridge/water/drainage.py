@@ -32,6 +32,9 @@ BALANCED = 1e-5
 FEW = 0.05
 """Fraction of the load at drained boundaries below which a boundary is left out"""
 
+UNLOADED = 1e-3
+"""Modulus over that of the law below which soil has no stiffness yet, as clay has none that carries nothing"""
+
 DAY = 86400.0
 
 
@@ -128,7 +131,9 @@ def _diffusivity(model: Any) -> NDArray[np.float64]:
     points, dim, count = model.points, model.domain.geometry.dim, owned_cells(model.domain)
     moduli = points.wave_moduli(model._laws)[:, 0].reshape(-1, points.per_cell)
     modulus, tensors = np.zeros(count), np.zeros((count, dim, dim))
-    modulus[points.cells] = np.where(np.isfinite(moduli).all(axis=1), moduli.mean(axis=1), 0.0)
+    least = UNLOADED * np.array([law.p_wave_modulus for law in model._laws])[points.material]
+    stiff = (np.isfinite(moduli) & (moduli > least[:, None])).all(axis=1)
+    modulus[points.cells] = np.where(stiff, moduli.mean(axis=1), 0.0)
     for soil, cells in zip(model._soils[0], model._soils[2]):
         if isinstance(soil.retention, AlwaysSaturated):
             tensors[cells[cells < count]] = soil.tensor(soil.conductivity, dim)

@@ -173,3 +173,19 @@ def test_what_an_equilibrium_of_a_coarse_tolerance_leaves_is_no_load(more):
     assert warned(lambda: model.run(200 * short, 50 * short)) == (0, "")
     model.load = bridge.Load(unit_weight=18e3, pressure={9: 9e3 + more})
     assert warned(lambda: model.run(201 * short, short))[0] == (more > 0)
+
+
+@pytest.mark.parametrize("carries, count", [(0.0, 0), (20e3, 1)])
+def test_soil_without_a_stiffness_before_its_first_load_is_left_out(carries, count):
+    """The stiffness of clay is that of its pressure: of one that carries nothing no length of consolidation is known."""
+    domain, _, facets = bridge.box_mesh(MPI.COMM_WORLD, (1.0, 1.0), (5, 5))
+    clay = mpm.CamClay(
+        compression=0.2, swelling=0.04, critical_slope=1.0, poisson=0.3, void_ratio=1.0, preconsolidation=100e3
+    )
+    supports = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(BASE)]
+    model = water.Consolidation(
+        domain, clay, water.PorousSoil(1e-8), facets, supports, [water.Head(TOP, 0.0)],
+        bridge.Load(pressure={TOP: carries + 1e3}), element=water.Element.STABILISED,
+    )  # fmt: skip
+    model.initialise(-carries * np.repeat([[1.0, 1.0, 1.0, 0.0]], len(model.points.stress), axis=0))
+    assert warned(lambda: model.run(1.0, 1.0))[0] == count
