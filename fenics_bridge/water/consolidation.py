@@ -153,8 +153,7 @@ class Consolidation(ConsolidationResults):
         self._active, self._inflow = (np.zeros(len(self.pressure.x.array), dtype=kind) for kind in (bool, float))
         self.motion: Motion | None = None
         """Velocity and acceleration; None in quasi-static steps"""
-        self.named_coarse_cells = False
-        """Whether `run` has warned of cells at a drained boundary that are too large for its first step"""
+        self._named_coarse_cells = False  # whether `run` has warned of cells that are too large for its first step
         self._assemble(options_prefix, inertia)
         self._external = self._loads.forces(Load())
         warn_of_laws(self, "Element.TAYLOR_HOOD hardly locks")

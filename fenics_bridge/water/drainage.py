@@ -51,25 +51,26 @@ class _Cells(NamedTuple):
     """c_v along the normal of the facets [m2/s]"""
 
 
-def warn_of_coarse_cells(model: Consolidation, first_step: float) -> bool:
+def warn_of_coarse_cells(model: Consolidation, first_step: float, until: float) -> bool:
     """Warn where cells at drained boundaries that are loaded are too large for the first step of a run [s]; returns whether it does.
 
-    Soil without a stiffness before its first load, and soil that may dry, is left out. Collective.
+    A step that only the end of the run [s] makes shorter, such as a time of output, is not called too short. Soil without a stiffness before its first load, and soil that may dry, is left out. Collective.
 
     Raises:
         InputError: a load or boundary condition is not possible at the end of the step. Raised on all ranks alike.
     """
     model._take_boundary()
-    model._applied.require_values(model.time + first_step)
-    text = _coarse_cells(model, first_step)
+    end = min(model.time + first_step, until)
+    model._applied.require_values(end)
+    text = _coarse_cells(model, first_step, end)
     if text and model.domain.comm.rank == 0:
         warnings.warn(text, RuntimeWarning, stacklevel=4)  # where `run` is called
     return bool(text)
 
 
-def _coarse_cells(model: Any, dt: float) -> str:
-    """What the warning says; empty where cells are small enough, or nothing changes in this step."""
-    comm, end = model.domain.comm, model.time + dt
+def _coarse_cells(model: Any, dt: float, end: float) -> str:
+    """What the warning says of steps dt [s]; empty where cells are small enough, or nothing changes up to a time [s]."""
+    comm = model.domain.comm
     coming = _forces_to_come(model, end)
     if coming is None:
         return ""

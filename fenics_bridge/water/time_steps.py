@@ -19,8 +19,8 @@ def run(
 ) -> list[Any]:
     """Do what `Consolidation.run` says."""
     agree(model.domain.comm, _mistake(until, model.time, first_step, growth, longest))
-    if model.motion is None and not model.named_coarse_cells:
-        model.named_coarse_cells = warn_of_coarse_cells(model, min(first_step, longest, until - model.time))
+    if model.motion is None and not model._named_coarse_cells:
+        model._named_coarse_cells = warn_of_coarse_cells(model, min(first_step, longest), until)
     reports, control = [], StepControl(longest, min(first_step, longest))
     while model.time < until * (1 - 1e-12) and control.length >= SHORTEST * first_step:
         step = min(control.length, until - model.time)

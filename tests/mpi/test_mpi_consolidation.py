@@ -1,5 +1,7 @@
 """Consolidation on several ranks is that on one."""
 
+import warnings
+
 import numpy as np
 import pytest
 from dolfinx.mesh import compute_midpoints, locate_entities, meshtags
@@ -50,6 +52,21 @@ def test_steps_with_plastic_soil_and_a_seepage_face_do_not_depend_on_the_number_
             ]
         )
     assert results[1] == pytest.approx(results[0], rel=1e-6, abs=1e-6)
+
+
+def test_the_first_rank_alone_warns_of_large_cells_and_all_remember_it():
+    texts = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        model = layer(comm, water.Element.STABILISED)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            for time in (1e2, 2e2):
+                assert model.run(time, 1e2)[-1].converged
+        here = [str(one.message) for one in caught if "cells at the drained boundary" in str(one.message)]
+        counts = comm.allgather(len(here))
+        assert counts == [1] + [0] * (comm.size - 1)
+        texts.append(comm.bcast(here))
+    assert texts[0] == texts[1]
 
 
 def test_a_bad_argument_is_refused_on_all_ranks():
