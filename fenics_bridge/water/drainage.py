@@ -54,7 +54,13 @@ class _Cells(NamedTuple):
 def warn_of_coarse_cells(model: Consolidation, first_step: float, until: float) -> bool:
     """Warn where cells at drained boundaries that are loaded are too large for the first step of a run [s]; returns whether it does.
 
-    A step that only the end of the run [s] makes shorter, such as a time of output, is not called too short. Soil without a stiffness before its first load, and soil that may dry, is left out. Collective.
+    Soil without a stiffness before its first load, and soil that may dry, is left out. So is that a run which ends within its first
+    step, such as at a time of output, makes it shorter. Collective.
+
+    Args:
+        model: the consolidation.
+        first_step: length of the first step [s].
+        until: time at the end of the run [s].
 
     Raises:
         InputError: a load or boundary condition is not possible at the end of the step. Raised on all ranks alike.
