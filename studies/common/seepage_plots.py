@@ -172,10 +172,7 @@ def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[n
         if np.any((lines > values.min()) & (lines < values.max())):  # matplotlib warns of none
             axes.tricontour(triangles, values, lines, colors="black", linewidths=0.35, alpha=0.6)
         _flow_lines(axes, triangles, picture, (low, high), fastest, DARK if quantity is PRESSURE else LIGHT)
-        segments = picture.table()
-        if len(segments):
-            draw_water_table(axes, segments)
-            table = True
+        table = draw_water_table(axes, picture.table()) or table
         axes.add_collection(LineCollection(picture.head.outline, colors="black", linewidths=0.8))
         axes.set_title(picture.name, loc="left", pad=3)
     panels[-1, 0].set_xlabel("$x$ [m]")

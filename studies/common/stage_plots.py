@@ -79,7 +79,7 @@ def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) 
     drawn = [v if is_strain else v[np.unique(s.field().cells)] for s, v in zip(stages, values)]
     limits = (0.0, max(float(np.quantile(v, 0.995)) for v in drawn) or 1.0)
     aspect = (box[1, 1] - box[0, 1]) / (box[1, 0] - box[0, 0])
-    along, up = axis_labels(stages[0].displacement.half_section)
+    (along, up), table = axis_labels(stages[0].displacement.half_section), False
     with paper_style():
         figure, panels = plt.subplots(len(stages), 1, figsize=(6.9, len(stages) * (5.4 * aspect + 0.35) + 0.45), sharex=True,
                                       squeeze=False, layout="constrained")  # fmt: skip
@@ -92,10 +92,9 @@ def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) 
             axes.add_collection(LineCollection(outline, colors="black", linewidths=0.7))
             axes.set_title(f"Stage: {stage.name}", loc="left", pad=3)
             axes.set(aspect="equal", xlim=box[:, 0], ylim=box[:, 1], ylabel=up)
-            if len(stage.water):
-                draw_water_table(axes, stage.water)
+            table = draw_water_table(axes, stage.water) or table
         panels[-1, 0].set_xlabel(along)
-        if any(len(stage.water) for stage in stages):
+        if table:
             water_legend(panels[0, 0])
         bar = figure.colorbar(ScalarMappable(Normalize(*limits), quantity.colours), ax=panels[:, 0].tolist(), shrink=0.6,
                               extend="max", pad=0.01)  # fmt: skip

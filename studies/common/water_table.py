@@ -55,11 +55,14 @@ def level_line(
     return polyline_segments(np.column_stack([along, level]))
 
 
-def draw_water_table(axes: Axes, segments: np.ndarray) -> None:
+def draw_water_table(axes: Axes, segments: np.ndarray) -> bool:
     """Draw the water table over everything else, with one triangle that stands on it near the right of the picture.
 
     Args:
-        segments: (k, 2, 2) [m]; the limits of the axes must be set.
+        segments: (k, 2, 2) [m], may be none; the limits of the axes must be set.
+
+    Returns:
+        Whether any of it lies within the picture.
     """
     # Not by a stroke, which each segment would have over the one before it.
     for colour, wide in (("white", WIDTH + 0.9), (TABLE, WIDTH)):
@@ -71,6 +74,7 @@ def draw_water_table(axes: Axes, segments: np.ndarray) -> None:
         raised = axes.transData + ScaledTranslation(0, 0.5 * (MARKER + WIDTH) / 72, axes.figure.dpi_scale_trans)
         axes.plot(*place, marker="v", color=TABLE, markersize=MARKER, markeredgecolor="white", markeredgewidth=0.6,
                   linestyle="none", transform=raised, zorder=6, clip_on=False)  # fmt: skip
+    return len(seen) > 0
 
 
 def water_legend(axes: Axes) -> None:

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgba
+from matplotlib.legend import Legend
 
 import fenics_bridge as bridge
-from studies.common import field_plots, seepage_plots
+from studies.common import field_plots, seepage_plots, stage_plots
 from studies.common.field_plots import Field, save_mechanism
 from studies.common.seepage_plots import MODERATE, PRESSURE, FlowPicture, pressure_limits, save_flow
 from studies.common.water_table import TABLE, draw_water_table, level_line, zero_line
@@ -126,6 +127,24 @@ def test_the_water_table_and_the_reservoir_are_drawn(monkeypatch):
     heights = np.array(water_lines(figure.axes[0]))[..., 1]
     assert np.allclose(heights[:-1], 4.2) and np.allclose(heights[-1], 12.0)
     assert not water_lines(drawn(monkeypatch, seepage_plots, save_flow, [flow(lambda x: 12 - x[:, 1])]).axes[0])
+
+
+@pytest.mark.parametrize(("level", "named"), [(6.0, True), (12.0, False)])
+def test_only_water_within_a_picture_is_in_its_legend(level, named, monkeypatch):
+    """The soil reaches up to 10 m, and the pictures of flow and of stages with it."""
+    water = level_line(bridge.hydrostatic(level), (0.0, 0.0), (20.0, 10.0))
+    line = np.concatenate([water[:1, 0], water[:, 1]])
+    soil = flow(lambda x: 12 - x[:, 1], [line])  # all of it saturated
+    at_rest = Field(soil.head.points, soil.head.cells, np.zeros((len(soil.head.points), 2)))
+    stage = stage_plots.StagePicture(
+        "", at_rest, np.ones(len(at_rest.cells), bool), np.zeros(len(at_rest.cells)), water
+    )
+    figures = [drawn(monkeypatch, seepage_plots, save_flow, [soil], PRESSURE),
+               drawn(monkeypatch, stage_plots, stage_plots.save_stages, [stage], stage_plots.MOVED)]  # fmt: skip
+    for figure in figures:
+        legends = [one for one in figure.axes[0].artists if isinstance(one, Legend)]
+        assert len(legends) == named == len(triangles(figure.axes[0]))
+        plt.close(figure)
 
 
 # --- mechanisms ------------------------------------------------------------------------------------------------------
