@@ -112,7 +112,7 @@ def require_push(pressure: float, where: str) -> None:
     if pressure < 0:
         raise mpm.InputError(
             f"{where} is {pressure:g} Pa, expected at least 0: a pressure pushes on the ground, and one below 0 would pull at it; "
-            "what is taken away is a pressure that falls, or soil that a stage digs away"
+            "to unload the ground, let a pressure fall with time, or let a stage dig soil away"
         )
 
 
