@@ -16,8 +16,8 @@ import mpm_core as mpm
 from fenics_bridge import water
 
 from .checks import say
-from .lengths import metres
 from .collapse_runs import UNDECIDED
+from .lengths import metres
 from .page import Page
 from .quiet import NOT_REACHED, without_warning
 from .results import open_results

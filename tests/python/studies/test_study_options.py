@@ -150,10 +150,11 @@ def test_results_do_not_go_to_a_file(tmp_path):
         importlib.import_module("slope").main(["--output", str(path)])
 
 
-def test_warnings_are_shown_without_their_place(tmp_path):
+def test_warnings_are_shown_once_and_without_their_place(tmp_path):
     script = tmp_path / "warns.py"
     script.write_text(
-        "import warnings\nfrom common.ranks import run_study\nrun_study(lambda: warnings.warn('soft') or 0)\n"
+        "import warnings\nfrom common.ranks import run_study\n"
+        "run_study(lambda: [warnings.warn('soft', stacklevel=level) for level in (1, 2, 3)] and 0)\n"
     )
     done = subprocess.run(
         [sys.executable, str(script)],
