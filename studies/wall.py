@@ -102,10 +102,27 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check_cells(p, a, 15 / a.cell_size**2, "--cell-size")
     say(f"--cell-size is {a.cell_size:g} of the height of the wall: active earth pressures are a quarter too low on an eighth, and half "
         "of what they should be on a quarter; take 0.1 or less" * (a.motion == "active" and a.cell_size > 0.1))  # fmt: skip
+    say(stands_alone(a))
     if a.movement is None:
         a.movement = 0.03 if a.motion == "passive" else 0.008
     check_restart(p, a, body_runs.MAY_CHANGE)
     return a
+
+
+def stands_alone(a: Namespace) -> str:
+    """What a warning says of sand whose cohesion holds it off a wall that moves away; empty for others.
+
+    Active pressures K (z + h) - h, with h = c cot(phi) over the unit weight, are negative down to z = h (1 / K - 1). The wall does
+    not pull there, so that the coefficient, which counts c cot(phi) as a pressure on the whole wall, is above the active one.
+    """
+    head = a.cohesion / np.tan(np.radians(a.friction_angle)) / (a.density * GRAVITY)
+    depth = head * (1 / bounds(a)[0] - 1)
+    if is_passive(a) or depth <= 0.25 * a.height:
+        return ""
+    return (
+        f"--cohesion is {a.cohesion:g} Pa, with which the sand stands by itself down to {depth:.3g} m of the wall's {a.height:g} m: there is "
+        "no active pressure there, and the coefficient, which counts c cot(phi) on the whole wall, is above the active one"
+    )
 
 
 # --- 2. Sand and wall ------------------------------------------------------------------------------------------------

@@ -87,3 +87,20 @@ def test_a_free_wall_stands_or_gives_way(support, tmp_path):
 def test_cells_too_coarse_for_active_pressures_are_said(options, said, recwarn):
     importlib.import_module("wall").parse(options.split())
     assert any("active earth pressures are a quarter too low" in str(one.message) for one in recwarn) == said
+
+
+@pytest.mark.parametrize(
+    ("options", "depth"),
+    [
+        # smooth: 2 c / (gamma sqrt(Ka)) = 2 x 5 kPa x sqrt(3) / (18 x 0.981 kN/m3)
+        ("--cohesion 5000", 0.981),
+        ("--cohesion 5000 --height 8", None),  # an eighth of the wall
+        ("--cohesion 5000 --motion passive", None),
+        ("", None),
+    ],
+)
+def test_sand_that_stands_by_itself_is_said(options, depth, recwarn):
+    importlib.import_module("wall").parse([*options.split(), "--cell-size", "0.1"])
+    said = [str(one.message) for one in recwarn if "stands by itself" in str(one.message)]
+    assert len(said) == (depth is not None)
+    assert depth is None or f"down to {depth:.3g} m of the wall's 1 m" in said[0]
