@@ -91,6 +91,9 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     )
     check(p, options.cell_size <= 0.5 * options.height,
           lambda: f"--cell-size is {options.cell_size:g}, expected at most half of --height")  # fmt: skip
+    check(p, options.unit_weight > options.initial_unit_weight,
+          lambda: f"--unit-weight is {options.unit_weight:g} N/m3, expected above --initial-unit-weight, "
+          f"{options.initial_unit_weight:g} N/m3: the slope fails as the unit weight rises")  # fmt: skip
     cells = 4 * options.width * (options.depth + 1) * (options.height / options.cell_size) ** 2
     check_cells(p, options, cells, "--cell-size", "--height", "--width", "--depth")
     return options
