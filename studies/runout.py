@@ -14,7 +14,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from common.checks import check_file
+from common.checks import check_effect, check_file
 from common.figures import Pictures
 from common.history import History
 from common.interrupt import Interrupt
@@ -88,6 +88,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
         (options.terrain is None) == (options.rupture is None),
         "--terrain and --rupture are both needed, or none of them",
     )
+    check_effect(p, options, options.terrain is None, ("--height", "--thickness"), "no --terrain")
+    check_effect(p, options, options.terrain is not None, ("--crs",), "--terrain and --rupture")
     check_file(p, options.terrain, "--terrain")
     check_file(p, options.rupture, "--rupture")
     check(p, options.spacing <= options.cell_size, lambda: f"--spacing is {options.spacing:g} m, expected --cell-size, "
@@ -110,6 +112,12 @@ def valley(a: Namespace) -> tuple[terrain.Raster, terrain.Raster]:
     return terrain.Raster(x, y, rupture + a.thickness * np.maximum(cap, 0)), terrain.Raster(x, y, rupture)
 
 
+def extent(raster: terrain.Raster) -> str:
+    """The area of a raster, in words."""
+    (x0, x1), (y0, y1) = ((along[0], along[-1]) for along in (raster.x, raster.y))
+    return f"x {x0:.8g} to {x1:.8g} m and y {y0:.8g} to {y1:.8g} m"
+
+
 def grounds(a: Namespace) -> tuple[terrain.Raster, terrain.Raster]:
     """Ground before and after the slide."""
     if a.terrain is None:
@@ -117,15 +125,38 @@ def grounds(a: Namespace) -> tuple[terrain.Raster, terrain.Raster]:
     before, rupture = (terrain.read_raster(path, crs=a.crs) for path in (a.terrain, a.rupture))
     low = max(before.x[0], rupture.x[0]), max(before.y[0], rupture.y[0])
     high = min(before.x[-1], rupture.x[-1]), min(before.y[-1], rupture.y[-1])
+    if low[0] >= high[0] or low[1] >= high[1]:
+        raise mpm.InputError(f"--rupture covers {extent(rupture)}, expected a part of --terrain, {extent(before)}")
     return before.window(low, high), rupture.window(low, high)
 
 
-def fine_part(before: terrain.Raster, rupture: terrain.Raster) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Region of the fine mesh: the slide, and the ground lower than its top within four of its lengths."""
+def body_between(a: Namespace, before: terrain.Raster, rupture: terrain.Raster) -> np.ndarray:
+    """Which points of the ground before the slide are more than 5 cm above the slip surface."""
     x, y = np.meshgrid(before.x, before.y)
-    body = before.values - rupture.at(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape) > 0.05
+    thickness = before.values - rupture.at(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape)
+    body: np.ndarray = thickness > 0.05
     if not body.any():
-        raise mpm.InputError("--terrain is nowhere higher than --rupture, expected a body between them")
+        raise mpm.InputError(
+            "--terrain is nowhere higher than --rupture, expected a body between them" if a.terrain is not None else
+            f"--thickness is {a.thickness:g} m with --height {a.height:g} m and --cell-size {a.cell_size:g} m, expected a slide "
+            "thicker than 0.05 m and longer than some cells: it is 0.7 --height long")  # fmt: skip
+    inside = np.zeros_like(body)
+    inside[1:-1, 1:-1] = True
+    if (body & ~inside).any():
+        raise mpm.InputError(
+            f"--terrain is up to {thickness[body & ~inside].max():.3g} m above --rupture at the edge of the rasters, expected the same "
+            "ground around the slide: elevations in metres from the same datum, and rasters larger than the slide")  # fmt: skip
+    return body
+
+
+def fine_part(before: terrain.Raster, body: np.ndarray) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Region of the fine mesh: the slide, and the ground lower than its top within four of its lengths.
+
+    Args:
+        before: ground before the slide.
+        body: which of its points belong to the slide, see ``body_between``.
+    """
+    x, y = np.meshgrid(before.x, before.y)
     reach = 4 * max(np.ptp(x[body]), np.ptp(y[body]))
     lower = (before.values < before.values[body].max()) & (x > x[body].min() - reach) & (x < x[body].max() + reach)
     lower &= (y > y[body].min() - reach) & (y < y[body].max() + reach)
@@ -137,7 +168,7 @@ def build(a: Namespace, before: terrain.Raster, rupture: terrain.Raster) -> tupl
     """Mesh, particles and contact; and by how much the slide was lifted [m]. Collective."""
     domain, _, facet_tags = terrain.terrain_mesh(
         comm, rupture, cell_size=a.cell_size, height=a.headroom + float((before.values - rupture.values).max()),
-        fine=fine_part(before, rupture),
+        fine=fine_part(before, body_between(a, before, rupture)),
     )  # fmt: skip
     soil = mpm.MohrCoulomb(
         young=a.young, poisson=0.3, cohesion=a.cohesion, friction_angle=a.friction_angle, dilation_angle=0.0
@@ -206,6 +237,17 @@ def run(
     return history, stopped
 
 
+def still_moving(history: History, mass: float) -> str:
+    """The end of a line of results: the speed of a slide whose kinetic energy is not below a hundredth of its maximum, or nothing."""
+    energy = history["kinetic_energy_J"]
+    if not energy[-1] > 0.01 * energy.max():
+        return ""
+    return (
+        f"; the slide still moves, by {np.sqrt(2 * energy[-1] / mass):.2g} m/s on average (root mean square): the maps are not those of a "
+        "deposit at rest, raise --time"
+    )
+
+
 # --- 4. All together -------------------------------------------------------------------------------------------------
 
 
@@ -250,7 +292,7 @@ def main(arguments: list[str] | None = None) -> int:
     said = (
         f"front {summary['front_m']:.1f} m from the initial centre of mass; the centre of mass fell {fall:.1f} m over "
         f"{travel:.1f} m; fastest {summary['fastest_m_per_s']:.1f} m/s; {summary['particle_steps_per_second'] / 1e6:.1f} million "
-        "particle-steps per second"
+        "particle-steps per second" + still_moving(history, a.density * volume) * (stopped is None)
     )
     return write_summary(folder, a, summary, comm, pictures=pictures if a.pictures else {}, said=said)
 

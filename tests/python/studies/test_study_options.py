@@ -69,6 +69,10 @@ REFUSED = [
     ("collapse", "--angle 5 --friction-angle 1 --mesh fitted", "--mesh is fitted, expected gmsh for --angle 5"),
     ("slope", "--cell-size 3", "--cell-size is 3 m, expected at most --height, 1 m, and --crest, 1.1 m"),
     ("slope", "--particles-per-cell 7", "--particles-per-cell is '7', expected one of 1, 3, 4, 6, 8, 10, 12, 15, 16,"),
+    ("runout", "--terrain no.asc --rupture no.tif --height 30", "--height is given, expected no --terrain with it"),
+    ("runout", "--crs local", "--crs is given, expected --terrain and --rupture with it"),
+    # a slope that does not fail
+    ("coupled_slope", "--unit-weight 20", "--unit-weight is 20 N/m3, expected above --initial-unit-weight, 15000 N/m3"),
     ("runout", "--terrain no.asc --rupture no.tif", "--terrain is no.asc, but there is no such file"),
 ]  # fmt: skip
 
