@@ -155,6 +155,16 @@ def collapse_factor(a: Namespace, history: History) -> float | None:
     return float(history["load_factor"][chosen].mean()) if chosen.any() else None
 
 
+def factor_said(a: Namespace, factor: float | None, settlement: float) -> str:
+    """The bearing capacity factor in words, or why there is none."""
+    if factor is not None:
+        return f"{factor:.2f}"
+    first, last = (2 * a.half_width * ratio / a.rigidity for ratio in COLLAPSE)
+    if settlement < first:
+        return f"not reached: it is read at settlements of {first:.3g} to {last:.3g} m"
+    return f"not known: none of --frames {a.frames} is at a settlement of {first:.3g} to {last:.3g} m"
+
+
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
@@ -201,8 +211,7 @@ def main(arguments: list[str] | None = None) -> int:
         "bearing_capacity_factor": factor, "exact_factor": exact, "largest_load_factor": float(history["load_factor"].max()),
         "settlement_m": settlement, "load_factor_in_the_end": load,
     }  # fmt: skip
-    shown = "not reached" if factor is None else f"{factor:.2f}"
-    said = f"{name}: N_c {shown}, exact {exact:.2f}; load factor {load:.2f} at a settlement of {settlement:.3g} m"
+    said = f"{name}: N_c {factor_said(a, factor, settlement)}, exact {exact:.2f}; load factor {load:.2f} at a settlement of {settlement:.3g} m"
     return write_results(
         a, model, result, folder, results, said, begin=begin,
         movies=[particle_movie(name, scene, result.frames)],

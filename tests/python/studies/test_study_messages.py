@@ -64,6 +64,20 @@ def test_initial_stresses_are_described_in_a_line():
     )
 
 
+@pytest.mark.parametrize(
+    "options, settlement, said",
+    [
+        # read from 12 to 24 times width s_u / E: 0.06 m to 0.12 m
+        ("", 0.02, "not reached: it is read at settlements of 0.06 to 0.12 m"),
+        ("--frames 2", 0.3, "not known: none of --frames 2 is at a settlement of 0.06 to 0.12 m"),
+    ],
+)
+def test_a_bearing_capacity_factor_that_is_not_known_says_why(options, settlement, said):
+    study = importlib.import_module("footing_push")
+    a = study.parse(options.split())
+    assert study.factor_said(a, None, settlement) == said and study.factor_said(a, 5.3, settlement) == "5.30"
+
+
 def test_help_shows_one_default_of_an_option():
     text = " ".join(importlib.import_module("retrogression").parser().format_help().split())
     assert "length of the level crest [m] (default: 30)" in text and "1.1 times the height" not in text
