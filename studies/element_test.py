@@ -29,6 +29,8 @@ import mpm_core as mpm
 
 SOFTEST = 10e3
 """Oedometric modulus [Pa] below which there is no soil: mud has some 50 kPa"""
+OWN_STIFFNESS = ("cam-clay", "nor-sand", "sanisand")
+"""Laws whose stiffness follows from the pressure"""
 TESTS = ("oedometer", "drained", "undrained", "shear", *CYCLIC)
 COLUMNS = ["axial_strain", "shear_strain", "volumetric_strain", "p_Pa", "q_Pa", "shear_stress_Pa",
            "excess_pore_pressure_Pa", "plastic_strain"]  # fmt: skip
@@ -91,6 +93,20 @@ def too_soft(a: Namespace, law: Any) -> str:
     return (
         f"the oedometric modulus of the soil is {law.p_wave_modulus:.4g} Pa, under a pressure of {a.pressure:g} Pa: moduli are in Pa, "
         "200e3 and more for most soils"
+    )
+
+
+def not_yielded(a: Namespace, plastic_strain: float) -> str:
+    """What a warning says of a test that ends before the soil yields; empty for others, and for laws of one's own.
+
+    Soil need not yield in an oedometer, because of its lateral stress, nor in cycles.
+    """
+    own = a.python_law or a.umat
+    if own or a.material == "elastic" or a.test in ("oedometer", *CYCLIC) or plastic_strain > 0:
+        return ""
+    stiffness = f" or --young, {a.young:g} Pa" * (a.material not in OWN_STIFFNESS)
+    return (
+        f"the soil has not yielded at --strain {a.strain:g}, so that q is not its strength: raise --strain{stiffness}"
     )
 
 
@@ -211,6 +227,8 @@ def main(arguments: list[str] | None = None) -> int:
     end = {name: float(history[name][-1]) for name in columns}
     end |= milestones(history, a) if a.test in CYCLIC else {}
     summary = {"finished_run": stopped is None, "stopped_because": stopped, "steps": len(history) - 1, **end}
+    if stopped is None and not too_soft(a, law):
+        say(not_yielded(a, end["plastic_strain"]))
     pictures = {"stress_path": lambda: draw(history, a, folder / "stress_path.png")}
     largest = history["q_Pa"].max()
     said = f"{a.test}: p' {end['p_Pa'] / 1e3:.4g} kPa, q {end['q_Pa'] / 1e3:.4g} kPa, largest q {largest / 1e3:.4g} kPa"

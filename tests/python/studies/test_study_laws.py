@@ -20,6 +20,23 @@ def test_drained_triaxial_test_ends_at_the_strength(tmp_path):
     assert all((tmp_path / name).stat().st_size > 0 for name in ("stress_path.png", "history.csv"))
 
 
+@pytest.mark.parametrize(
+    "options, said",
+    [
+        # q = 3 G x 0.2 = 3 x 75.2 kPa x 0.2 = 45.1 kPa, below the strength of 6 (50 kPa sin phi + c cos phi) / (3 - sin phi) = 63 kPa
+        ("--test undrained --pressure 50e3 --friction-angle 30 --cohesion 1e3", "raise --strain or --young, 200000 Pa"),
+        ("--test undrained --pressure 50e3 --friction-angle 30 --cohesion 1e3 --strain 0.3", ""),  # 68 kPa
+        ("--material cam-clay --preconsolidation 200e3 --strain 1e-3", "raise --strain"),
+        ("--material elastic", ""),
+    ],
+)
+def test_a_test_that_ends_before_the_soil_yields_is_said(options, said, tmp_path):
+    result = ended("element_test", tmp_path, "--steps", "20", *options.split())
+    assert result.returncode == 0, result.stderr
+    assert ("the soil has not yielded" in result.stderr) == bool(said) and said in result.stderr
+    assert ("--young" in result.stderr) == ("--young" in said)
+
+
 def test_undrained_triaxial_test_of_cam_clay_ends_at_the_critical_state(tmp_path):
     # By water that is stiff, and by constant volume: q = M p', p' = p_c/2 (2 p_0/p_c)^(kappa/lambda) from p_0 = p_c
     for k, options in enumerate((["--test", "undrained"], ["--undrained", "--water-modulus", "2e9"])):
