@@ -21,7 +21,7 @@ import numpy as np
 from common import body_runs
 from common.body_runs import BodyRun, follow, mean_force
 from common.checkpoint import check_restart
-from common.checks import check_cells, check_effect, check_whole
+from common.checks import check_cells, check_effect, check_whole, say
 from common.figures import Pictures, curve_figure
 from common.flow_impact import bore
 from common.history import History
@@ -109,6 +109,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
         check(p, a.base_friction_angle < 80,
               lambda: f"--slope is {a.slope:g} degrees, expected a gentler one, on which sand slides steadily with --pressure-ratio "
               f"{a.pressure_ratio:g}, or --base-friction-angle")  # fmt: skip
+        say(f"--friction-angle is {a.friction_angle:g} degrees, less than the {a.base_friction_angle:.3g} degrees at which the flow would keep "
+            "its velocity on the plane: the sand shears and the flow accelerates" * (a.base_friction_angle > a.friction_angle))  # fmt: skip
     check(p, a.length > 2 / np.tan(np.radians(a.front_angle)),
           lambda: f"--length is {a.length:g}, expected more than twice the front's, "
           f"{1 / np.tan(np.radians(a.front_angle)):.3g}")  # fmt: skip

@@ -79,3 +79,20 @@ def test_forces_of_wall_and_plane_stop_the_flow(tmp_path):
     taken = sum(contact.impulse for contact in model.contacts)
     assert np.array(report.momentum) - first == pytest.approx(given - taken, abs=1e-9 * np.abs(first).max())
     assert model.contacts[0].impulse[0] > 0.5 * first[0]
+
+
+@pytest.mark.parametrize(
+    ("options", "angle"),
+    [
+        ("--slope 40", "40"),
+        ("--slope 40 --friction-angle 42", None),
+        ("--slope 40 --base-friction-angle 20", None),  # given, and no steady flow
+        ("--slope 20 --pressure-ratio 0.5", "36.1"),  # tan(20 degrees) / (1 - 0.5) = tan(36.1 degrees)
+        ("", None),
+    ],
+)
+def test_sand_too_weak_for_a_steady_flow_is_said(options, angle, recwarn):
+    importlib.import_module("barrier").parse(options.split())
+    said = [str(one.message) for one in recwarn if "the flow accelerates" in str(one.message)]
+    assert len(said) == (angle is not None)
+    assert angle is None or f"--friction-angle is 30 degrees, less than the {angle} degrees" in said[0]
