@@ -8,6 +8,7 @@ pressure is drawn. A law of your own is given by --python-law FILE.py:CLASS, or 
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,8 @@ SOFTEST = 10e3
 """Oedometric modulus [Pa] below which there is no soil: mud has some 50 kPa"""
 OWN_STIFFNESS = ("cam-clay", "nor-sand", "sanisand")
 """Laws whose stiffness follows from the pressure"""
+PRECONSOLIDATED = {"cam-clay": "--preconsolidation", "nor-sand": "--image-pressure"}
+"""Laws with a largest pressure, and the options that set it"""
 TESTS = ("oedometer", "drained", "undrained", "shear", *CYCLIC)
 COLUMNS = ["axial_strain", "shear_strain", "volumetric_strain", "p_Pa", "q_Pa", "shear_stress_Pa",
            "excess_pore_pressure_Pa", "plastic_strain"]  # fmt: skip
@@ -107,6 +110,35 @@ def not_yielded(a: Namespace, plastic_strain: float) -> str:
     stiffness = f" or --young, {a.young:g} Pa" * (a.material not in OWN_STIFFNESS)
     return (
         f"the soil has not yielded at --strain {a.strain:g}, so that q is not its strength: raise --strain{stiffness}"
+    )
+
+
+def check_start(a: Namespace, law: Any) -> None:
+    """End with an error where the soil cannot be under the pressure at the start: without a strain, its law would change the stress.
+
+    Raises:
+        InputError: --pressure is outside of the yield surface.
+    """
+    if a.python_law or a.umat or a.material not in PRECONSOLIDATED:
+        return
+    test = mpm.ElementTest(law, [-a.pressure] * 3 + [0.0] * 3)
+    with suppress(mpm.RunError):
+        test.step([0.0] * 6, dt=np.inf)
+    if np.abs(test.stress[:3] + a.pressure).max() > 1e-6 * a.pressure:
+        name = PRECONSOLIDATED[a.material]
+        value = getattr(a, name.removeprefix("--").replace("-", "_"))
+        raise mpm.InputError(
+            f"--pressure is {a.pressure:g} Pa, expected one inside of the yield surface, which has {name} {value:g} Pa: raise {name}"
+        )
+
+
+def never_cycled(a: Namespace, number: float) -> str:
+    """What a warning says of a cyclic test without a cycle; empty for others."""
+    if a.test not in CYCLIC or number > 0:
+        return ""
+    return (
+        f"--stress-ratio is {a.stress_ratio:g}, more than the soil carries: it reached --strain {a.strain:g} in the first loading, without a "
+        "cycle"
     )
 
 
@@ -219,6 +251,7 @@ def main(arguments: list[str] | None = None) -> int:
     law = law_of(a)
     say(too_soft(a, law))
     say(angles_in_radians([law]))
+    check_start(a, law)
     folder = open_results(a)
     test = mpm.ElementTest(law, [-a.pressure] * 3 + [0.0] * 3)
     columns = COLUMNS + (OF_CYCLES if a.test in CYCLIC else [])
@@ -229,6 +262,7 @@ def main(arguments: list[str] | None = None) -> int:
     summary = {"finished_run": stopped is None, "stopped_because": stopped, "steps": len(history) - 1, **end}
     if stopped is None and not too_soft(a, law):
         say(not_yielded(a, end["plastic_strain"]))
+        say(never_cycled(a, end.get("cycles", 0.0)))
     pictures = {"stress_path": lambda: draw(history, a, folder / "stress_path.png")}
     largest = history["q_Pa"].max()
     said = f"{a.test}: p' {end['p_Pa'] / 1e3:.4g} kPa, q {end['q_Pa'] / 1e3:.4g} kPa, largest q {largest / 1e3:.4g} kPa"

@@ -37,6 +37,33 @@ def test_a_test_that_ends_before_the_soil_yields_is_said(options, said, tmp_path
     assert ("--young" in result.stderr) == ("--young" in said)
 
 
+@pytest.mark.parametrize(
+    "options, refused",
+    [
+        # without shear stress, Cam-Clay yields at p = p_c
+        ("--material cam-clay --pressure 20.1e3", "--preconsolidation 20000 Pa: raise --preconsolidation"),
+        ("--material cam-clay --pressure 200e3 --undrained", "--preconsolidation 20000 Pa: raise"),
+        ("--material cam-clay --pressure 20e3", ""),
+        # NorSand at e times the image pressure, both with the attraction: 21 kPa e - 1 kPa = 56.1 kPa
+        ("--material nor-sand --pressure 56.2e3", "--image-pressure 20000 Pa: raise --image-pressure"),
+        ("--material nor-sand --pressure 56e3", ""),
+    ],
+)
+def test_pressures_outside_of_the_yield_surface_are_refused(options, refused, tmp_path):
+    result = ended("element_test", tmp_path / "out", "--steps", "5", *options.split())
+    assert (result.returncode != 0) == bool(refused)
+    assert refused in result.stderr and ("inside of the yield surface" in result.stderr) == bool(refused)
+
+
+@pytest.mark.parametrize("ratio, said", [(2.0, True), (0.4, False)])
+def test_a_stress_ratio_above_the_strength_is_said(ratio, said, tmp_path):
+    # q / (2 p) = 0.54 at the strength, by q = 6 (p sin phi + c cos phi) / (3 - sin phi) with 20 kPa, 25 degrees and 1 kPa
+    cyclic = ["--test", "cyclic-triaxial", "--young", "20e6", "--strain", "0.02", "--cycles", "1"]
+    result = ended("element_test", tmp_path, *cyclic, "--stress-ratio", str(ratio))
+    assert result.returncode == 0, result.stderr
+    assert (f"--stress-ratio is {ratio:g}, more than the soil carries" in result.stderr) == said
+
+
 def test_undrained_triaxial_test_of_cam_clay_ends_at_the_critical_state(tmp_path):
     # By water that is stiff, and by constant volume: q = M p', p' = p_c/2 (2 p_0/p_c)^(kappa/lambda) from p_0 = p_c
     for k, options in enumerate((["--test", "undrained"], ["--undrained", "--water-modulus", "2e9"])):
