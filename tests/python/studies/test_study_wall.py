@@ -104,3 +104,22 @@ def test_sand_that_stands_by_itself_is_said(options, depth, recwarn):
     said = [str(one.message) for one in recwarn if "stands by itself" in str(one.message)]
     assert len(said) == (depth is not None)
     assert depth is None or f"down to {depth:.3g} m of the wall's 1 m" in said[0]
+
+
+@pytest.mark.parametrize(
+    ("options", "most"),
+    [
+        # waves travel at sqrt(1.346 x 10 MPa / 1800 kg/m3) = 86.5 m/s: 0.0116 s over 1 m, and 0.008 / (20 x 0.0116 s) = 0.035
+        ("--speed 1", "0.035"),
+        ("--speed 0.04", "0.035"),
+        ("--speed 0.03", None),
+        ("--speed 0.1 --motion passive", None),  # at most 0.03 / (20 x 0.0116 s) = 0.13
+        ("", None),
+        ("--motion free", None),
+    ],
+)
+def test_a_wall_too_fast_for_its_sand_is_said(options, most, recwarn):
+    importlib.import_module("wall").parse(options.split())
+    said = [str(one.message) for one in recwarn if "the inertia of the sand" in str(one.message)]
+    assert len(said) == (most is not None)
+    assert most is None or f"take {most} or less" in said[0]
