@@ -22,7 +22,7 @@ from common.history import History
 from common.interrupt import Interrupt
 from common.lengths import metres
 from common.movie import particle_frame, particle_movie
-from common.options import add_choice, add_count, add_number, add_switch, study_parser
+from common.options import add_choice, add_count, add_number, add_switch, check, study_parser
 from common.output_options import add_picture_options
 from common.page import Page
 from common.plots import DISPLACEMENT, SHEAR_STRAIN, Scene, save_particles
@@ -226,6 +226,8 @@ def main(arguments: list[str] | None = None) -> int:
     p = parser()
     a = p.parse_args(arguments)
     check_slope_options(p, a)
+    check(p, a.disturbed >= a.cell_size, lambda: f"--disturbed is {a.disturbed:g} m, expected at least --cell-size, {a.cell_size:g} m: the clay "
+          "is disturbed cell by cell")  # fmt: skip
     folder = open_results(a, comm)
     results, movies, pictures = [], [], {}
     with Interrupt(comm) as interrupt:

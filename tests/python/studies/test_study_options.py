@@ -72,6 +72,7 @@ REFUSED = [
     ("runout", "--terrain no.asc --rupture no.tif --height 30", "--height is given, expected no --terrain with it"),
     ("runout", "--crs local", "--crs is given, expected --terrain and --rupture with it"),
     # a slope that does not fail
+    ("retrogression", "--disturbed 0.2 --cell-size 1", "--disturbed is 0.2 m, expected at least --cell-size, 1 m"),
     ("coupled_slope", "--unit-weight 20", "--unit-weight is 20 N/m3, expected above --initial-unit-weight, 15000 N/m3"),
     ("runout", "--terrain no.asc --rupture no.tif", "--terrain is no.asc, but there is no such file"),
 ]  # fmt: skip
