@@ -62,7 +62,8 @@ def checked_values(source: str, table: Mapping[str, Any], actions: Sequence[argp
 
     Args:
         source: of the table, for messages.
-        table: None stands for an option that was not named.
+        table: by the options' names, or as ``summary.json`` has them, ``friction_angle`` for ``friction-angle``. None stands for an
+            option that was not named.
 
     Raises:
         ParameterError: an unknown key; a value of another type or out of bounds.
@@ -70,9 +71,11 @@ def checked_values(source: str, table: Mapping[str, Any], actions: Sequence[argp
     known = _named(actions)
     values: dict[str, object] = {}
     for key, value in table.items():
-        key = present_name(key, actions)
+        key = present_name(key.replace("_", "-"), actions)
         if key not in known:
             raise ParameterError(f"{source}: {unknown_key(key, known)}")
+        if known[key].dest in values:
+            raise ParameterError(f"{source}: {key} is given twice, as {key} and as {key.replace('-', '_')}")
         try:
             values[known[key].dest] = None if value is None else _from_toml(known[key], value)
         except (argparse.ArgumentTypeError, ValueError) as error:

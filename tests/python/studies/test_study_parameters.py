@@ -35,6 +35,10 @@ def test_the_file_gives_values_of_every_kind(tmp_path):
     assert (options.initial, options.nmd, options.paper) == ("zero", True, True)
 
 
+def test_names_may_be_those_of_the_summary(tmp_path):
+    assert parse(tmp_path, "cell_size = 1").cell_size == 1.0
+
+
 def test_the_command_line_wins_over_the_file(tmp_path):
     options = parse(tmp_path, "frames = 3\nnmd = true\ndt = 0.5", "--frames", "7", "--no-nmd")
     assert (options.frames, options.nmd, options.dt) == (7, False, 0.5)
@@ -55,6 +59,7 @@ def test_what_was_written_is_read_back_to_the_last_bit(tmp_path):
     ("text", "message"),
     [
         ("cel-size = 1", "given.toml: unknown key 'cel-size'; did you mean cell-size?"),
+        ("cell-size = 1\ncell_size = 2", "given.toml: cell-size is given twice, as cell-size and as cell_size"),
         ("output = 'x'", "unknown key 'output', expected some of cell-size, dt,"),
         ("cell-size = 'big'", "given.toml: cell-size is 'big', expected a number"),
         ("cell-size = -1", "given.toml: cell-size is '-1', expected a number above 0 m"),
