@@ -13,6 +13,7 @@ OPTIONS = {
     "second_order=True": "--second-order",
     "a smaller start": "a smaller --start",
     "a longer first_step": "a longer --first-step",
+    "name it by crs=, for instance crs='EPSG:25832', or crs='local'": "name it by --crs EPSG:25832 for instance, or --crs local",
     "more steps of relaxation (max_steps of Solver), a tolerance as in practice (PRACTICE)": "--equilibrium practice",
 }
 """Words of the library, and those of studies that have the option in them"""

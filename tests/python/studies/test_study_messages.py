@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from fenics_bridge import terrain
 from fenics_bridge.fem import failure
 from fenics_bridge.fem.locking import warn_of_locking_at_failure
 from mpm_core import failure_watch
@@ -113,6 +114,15 @@ def test_errors_of_the_library_name_the_options_of_a_study():
         "gave up: try smaller steps, --equilibrium practice, or more dilation"
     )
     assert "a smaller --start" in in_options("2.1 %, or take a smaller start", parser)
+
+
+def test_a_raster_without_coordinate_reference_names_the_option(tmp_path):
+    path = tmp_path / "ground.asc"
+    path.write_text("ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 1\n1 1\n")
+    with pytest.raises(mpm.InputError, match="is unknown") as error:
+        terrain.read_raster(path)
+    text = in_options(str(error.value), importlib.import_module("runout").parser())
+    assert "name it by --crs EPSG:25832 for instance, or --crs local" in text and "crs=" not in text
 
 
 def test_a_script_without_options_says_what_the_library_says():
