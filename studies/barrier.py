@@ -49,8 +49,8 @@ COLUMNS = [
     "unexplained_fraction_of_energy",
     "dt_s",
 ]
-FULL = 2.0
-"""Times of passage, depth over velocity, after the front has passed, until the bore is taken as formed"""
+FULL = 0.5
+"""Part of the time in which sand rises at the wall, thrown up with the velocity of the flow, until the bore is taken as formed"""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -60,7 +60,8 @@ def parser() -> ArgumentParser:
     """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_number(p, "--depth", 0.5, "m", "depth of the flow", above=0)
-    add_number(p, "--length", 14.0, "-", "ratio of the flow's length to its depth, rounded to whole cells", at_least=4)
+    add_number(p, "--length", None, "-", "ratio of the flow's length to its depth, rounded to whole cells (default: the duration + 6)",
+               at_least=4)  # fmt: skip
     add_number(
         p, "--froude", 2.0, "-", "Froude number, the ratio of the flow's velocity to that of shallow waves", at_least=1
     )
@@ -78,7 +79,8 @@ def parser() -> ArgumentParser:
     add_number(p, "--conductivity", 1e-5, "m/s", "saturated sand: hydraulic conductivity", above=0)
     add_number(p, "--porosity", 0.45, "-", "saturated sand: porosity", above=0, below=1)
     add_number(p, "--water-modulus", 2e7, "Pa", "saturated sand: bulk modulus of the water", above=0)
-    add_number(p, "--duration", 8.0, "-", "duration of the run, in multiples of depth/velocity", above=0)
+    add_number(p, "--duration", None, "-", "duration of the run, in multiples of depth/velocity (default: twice the square of the Froude number, "
+               "in which sand rises at the wall and falls back, 8 at least)", above=0)  # fmt: skip
     add_number(
         p,
         "--cell-size",
@@ -95,6 +97,10 @@ def parser() -> ArgumentParser:
 def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     a = p.parse_args(arguments)
+    if a.duration is None:
+        a.duration = max(8.0, 2 * rise(a))
+    if a.length is None:
+        a.length = a.duration + 6
     wet = a.pressure_ratio > 0
     check_effect(p, a, wet, ("--conductivity", "--porosity", "--water-modulus"), "--pressure-ratio above 0")
     if a.density is None:
@@ -137,6 +143,11 @@ def velocity(a: Namespace) -> float:
 def passage(a: Namespace) -> float:
     """Depth over velocity [s]."""
     return float(a.depth / velocity(a))
+
+
+def rise(a: Namespace) -> float:
+    """Time in which sand rises that is thrown up with the velocity of the flow, u / g, in multiples of depth over velocity [-]."""
+    return float(a.froude**2)
 
 
 def unit_force(a: Namespace) -> float:
@@ -214,7 +225,7 @@ def row(a: Namespace, wall: mpm.RigidContact, history: History, report: mpm.Repo
 
 def full_force(a: Namespace, history: History) -> float | None:
     """Mean force over rho g h^2 since the bore has formed; None where the run ended before."""
-    start = (FULL + 1 / np.tan(np.radians(a.front_angle))) * passage(a)
+    start = (FULL * rise(a) + 1 / np.tan(np.radians(a.front_angle))) * passage(a)
     chosen = history["time_s"] >= start
     return float(history["force_factor"][chosen].mean()) if chosen.any() else None
 

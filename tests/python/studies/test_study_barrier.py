@@ -25,9 +25,11 @@ def test_a_bore_keeps_mass_and_momentum(froude, after, before):
     assert force == pytest.approx(0.5 * after * depth**2, rel=1e-10)
 
 
-def test_sand_at_a_wall_pushes_between_two_bores(tmp_path):
+@pytest.mark.parametrize("froude", [2.0, 3.0])
+def test_sand_at_a_wall_pushes_between_two_bores(froude, tmp_path):
+    """The faster the flow, the longer sand rises at the wall before the bore has formed."""
     barrier = importlib.import_module("barrier")
-    size = "--cell-size 0.25 --particles-per-cell 6 --length 12 --frames 16 --no-pictures"
+    size = f"--cell-size 0.25 --particles-per-cell 6 --froude {froude:g} --frames 16 --no-pictures"
     assert barrier.main([*size.split(), "--output", str(tmp_path)]) == 0
     found = json.loads((tmp_path / "summary.json").read_text())
     fluid, passive = found["force_of_bore_in_fluid_N_per_m"], found["force_of_bore_in_sand_N_per_m"]
