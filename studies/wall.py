@@ -3,8 +3,9 @@
 A wall retains sand, which lies on rock with the friction angle of the sand. The wall moves away from the sand (active
 pressure) or into it (passive pressure), or it is free and held by a force that falls to a fraction of the active one. For a
 smooth wall the coefficients are Rankine's. For a rough wall they lie between those of a stress field (Lancellotta 2002),
-which are on the safe side, and those of a plane wedge (Coulomb 1776), which are not. Sand that does not dilate may not
-mobilise all of the wall friction.
+which are on the safe side, and those of a plane wedge (Coulomb 1776), which are not, if the sand dilates by its friction angle.
+Sand that dilates by less mobilises less of its strength where it slides along a rough wall: the field of stresses with the
+strength of Davis (1968) is then the other end of what may be. It may not mobilise all of the wall friction either.
 """
 
 from __future__ import annotations
@@ -174,6 +175,19 @@ def bounds(a: Namespace) -> tuple[float, float]:
     return stress_field(*angles, passive=is_passive(a)), coulomb(*angles, passive=is_passive(a))
 
 
+def davis_bound(a: Namespace) -> float | None:
+    """Coefficient by a field of stresses with the strength on slip lines of sand that dilates by less than its friction angle [-].
+
+    tan(phi*) = sin(phi) cos(psi) / (1 - sin(phi) sin(psi)) (Davis 1968). None behind smooth walls, where Rankine's coefficient is
+    exact, and for sand that dilates by its friction angle.
+    """
+    if a.wall_friction_angle == 0 or a.dilation_angle == a.friction_angle:
+        return None
+    phi, psi, delta = np.radians([a.friction_angle, a.dilation_angle, a.wall_friction_angle])
+    reduced = np.arctan(np.sin(phi) * np.cos(psi) / (1 - np.sin(phi) * np.sin(psi)))
+    return stress_field(reduced, min(delta, reduced), passive=is_passive(a))
+
+
 def wall_mass(a: Namespace) -> float:
     """Mass of a free wall [kg/m]."""
     return float(a.wall_mass * a.density * a.height**2)
@@ -269,6 +283,13 @@ def in_the_end(a: Namespace, history: History, column: str) -> float:
     return float(history[column][moved >= (1 - LAST) * moved[-1]].mean())
 
 
+def mobilised(a: Namespace, friction: float) -> str:
+    """The end of a line of results: how much of its friction a rough wall mobilises; the bounds assume all of it."""
+    if a.wall_friction_angle == 0:
+        return ""
+    return f"; of its friction angle of {a.wall_friction_angle:g} degrees {np.degrees(np.arctan(friction)):.3g} degrees are mobilised"
+
+
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
@@ -283,6 +304,11 @@ def draw_pressure(path: Path, a: Namespace, history: History) -> None:
             axes.axhline(value, color="black", linewidth=0.9, linestyle=style, label=f"{name}, {value:.3f}")
             if a.wall_friction_angle == 0:
                 break
+        davis = davis_bound(a)
+        if davis is not None:
+            axes.axhline(
+                davis, color="black", linewidth=0.9, linestyle="-.", label=f"with Davis' strength, {davis:.3f}"
+            )
         if free:
             axes.axhline(
                 a.support * bounds(a)[0], color=GREY, linewidth=0.9, label="force that holds the wall in the end"
@@ -317,14 +343,17 @@ def main(arguments: list[str] | None = None) -> int:
     coefficient, friction = (in_the_end(a, history, name) for name in ("coefficient", "wall_friction"))
     moved = history["wall_displacement_m"][-1]
     field, wedge = bounds(a)
+    davis = davis_bound(a)
+    with_davis = "" if davis is None else f", and {davis:.3f} with the strength of Davis for this dilation"
     results = {
         "coefficient_in_the_end": coefficient, "coefficient_by_stress_field": field, "coefficient_by_plane_wedge": wedge,
+        "coefficient_by_stress_field_without_full_dilation": davis,
         "coefficient_at_rest": history["coefficient"][0], "wall_displacement_m": moved,
         "wall_friction_angle_in_the_end_degrees": float(np.degrees(np.arctan(friction))), **accelerations(a, history),
     }  # fmt: skip
     said = (
         f"{a.motion} wall: coefficient {coefficient:.3f} in the end, by a field of stresses {field:.3f}, by a plane wedge "
-        f"{wedge:.3f}; the wall moved by {abs(moved):.3g} m"
+        f"{wedge:.3f}{with_davis}; the wall moved by {abs(moved):.3g} m{mobilised(a, friction)}"
     )
     return body_runs.write_results(
         a, model, result, folder, results, said, begin=begin,

@@ -123,3 +123,24 @@ def test_a_wall_too_fast_for_its_sand_is_said(options, most, recwarn):
     said = [str(one.message) for one in recwarn if "the inertia of the sand" in str(one.message)]
     assert len(said) == (most is not None)
     assert most is None or f"take {most} or less" in said[0]
+
+
+def test_the_friction_that_a_rough_wall_mobilises_is_said():
+    wall = importlib.import_module("wall")
+    assert wall.mobilised(wall.parse([]), 0.5) == ""
+    rough = wall.parse(["--wall-friction-angle", "20"])
+    assert wall.mobilised(rough, np.tan(np.radians(12.5))) == (
+        "; of its friction angle of 20 degrees 12.5 degrees are mobilised"
+    )
+
+
+def test_sand_that_dilates_little_has_another_coefficient_behind_rough_walls():
+    """Where it does not dilate, with tan(phi*) = sin(phi)."""
+    wall = importlib.import_module("wall")
+    rough = ["--friction-angle", "40", "--wall-friction-angle", "30"]
+    reduced, delta = np.arctan(np.sin(np.radians(40))), np.radians(30)
+    assert wall.davis_bound(wall.parse(rough)) == pytest.approx(stress_field(reduced, delta, passive=False))
+    passive = wall.davis_bound(wall.parse([*rough, "--motion", "passive"]))
+    assert passive == pytest.approx(stress_field(reduced, delta, passive=True))
+    assert wall.davis_bound(wall.parse([*rough, "--dilation-angle", "40"])) is None
+    assert wall.davis_bound(wall.parse(["--friction-angle", "40"])) is None
