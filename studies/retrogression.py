@@ -49,9 +49,9 @@ MEASURES = {
 }  # fmt: skip
 """Quantities by which the mesh sizes are compared. Nearly all of the stresses' work is dissipated in the slips: the
 elastic energy of the soil changes little."""
-AT_REST, REST = 1e-3, 2.0
-"""A slope is at rest when its kinetic energy has stayed below this fraction of its maximum for this time [s]: a scarp
-may stand for a moment before it fails too."""
+AT_REST, STILL, REST = 1e-3, 1e-3, 2.0
+"""A slope is at rest when its kinetic energy has stayed below this fraction of its maximum, or its velocity on average (root mean
+square) below this one [m/s], for this time [s]: a scarp may stand for a moment before it fails too."""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -141,11 +141,12 @@ class Slide:
             self.frames.append(frame)
 
 
-def is_at_rest(history: History) -> bool:
-    """Whether the kinetic energy has been low for long enough."""
+def is_at_rest(history: History, mass: float) -> bool:
+    """Whether the kinetic energy of a slope of a mass [kg/m] has been low for long enough, and has not been growing."""
     time, energy = history["time_s"], history["kinetic_energy_J_per_m"]
-    moving = np.flatnonzero(energy >= AT_REST * energy.max())
-    return bool(energy.max() > 0 and len(moving) and time[-1] - time[moving[-1]] >= REST)
+    moving = energy >= max(AT_REST * energy.max(), 0.5 * mass * STILL**2)
+    moving[energy.argmax()] = True
+    return bool(time[-1] - time[np.flatnonzero(moving)[-1]] >= REST)
 
 
 def slide(args: Namespace, size: float, folder: Path, interrupt: Interrupt) -> Slide:
@@ -164,7 +165,7 @@ def slide(args: Namespace, size: float, folder: Path, interrupt: Interrupt) -> S
             for report in model.explicit(a.time, every=a.time / a.frames, damping=a.damping, pic=a.pic, nmd=a.nmd):
                 result.look(report)
                 progress.show(report.time, report.steps, runout=metres(history["runout_m"][-1]))
-                result.at_rest = is_at_rest(history)
+                result.at_rest = is_at_rest(history, report.mass)
                 if interrupt.requested():
                     result.stopped = f"interrupted at {report.time:g} s"
                 if result.at_rest or result.stopped:

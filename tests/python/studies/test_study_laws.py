@@ -1,5 +1,6 @@
 """The studies of laws: element tests from the command line, the slope of other soils, and retrogression, all small."""
 
+import importlib
 import json
 
 import numpy as np
@@ -234,3 +235,18 @@ def test_cycles_of_sand_between_two_stresses(tmp_path):
 def test_wrong_options_of_sand_and_cycles_are_named(tmp_path, options, message):
     result = ended("element_test", tmp_path, "--material", "sanisand", *options)
     assert result.returncode == 2 and message in result.stderr, result.stderr
+
+
+@pytest.mark.parametrize(
+    "energies, at_rest",
+    [
+        ([0.0, 1e3, 10.0, 5.0, 4.0], False),  # above a thousandth of the largest
+        ([0.0, 1e3, 0.9, 0.8, 0.7], True),
+        ([0.0, 4e-3, 3e-3, 3e-3, 3e-3], True),  # of 10 t: less than 1 mm/s, 5e-3 J, all the time
+        ([0.0, 1e-3, 2e-3, 3e-3, 4e-3], False),  # begins to fail
+    ],
+)
+def test_retrogression_is_at_rest_where_nothing_moves(energies, at_rest):
+    study = importlib.import_module("retrogression")
+    history = {"time_s": np.arange(5.0), "kinetic_energy_J_per_m": np.array(energies)}
+    assert study.is_at_rest(history, 10e3) == at_rest
