@@ -109,6 +109,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     if a.movement is None:
         a.movement = 0.03 if a.motion == "passive" else 0.008
     say(too_fast(a))
+    say(f"--movement is {a.movement:g} of the height: the sand heaves before the wall, and its coefficient rises above that of level ground, "
+        "of smooth walls by a tenth at 0.1 and a fifth at 0.2" * (a.motion == "passive" and a.movement >= 0.1))  # fmt: skip
     check_restart(p, a, body_runs.MAY_CHANGE)
     return a
 

@@ -144,3 +144,11 @@ def test_sand_that_dilates_little_has_another_coefficient_behind_rough_walls():
     assert passive == pytest.approx(stress_field(reduced, delta, passive=True))
     assert wall.davis_bound(wall.parse([*rough, "--dilation-angle", "40"])) is None
     assert wall.davis_bound(wall.parse(["--friction-angle", "40"])) is None
+
+
+@pytest.mark.parametrize(
+    "options, said", [("passive --movement 0.2", True), ("passive", False), ("active --movement 0.2", False)]
+)
+def test_sand_that_heaves_before_a_wall_is_said(options, said, recwarn):
+    importlib.import_module("wall").parse(["--motion", *options.split()])
+    assert any("the sand heaves before the wall" in str(one.message) for one in recwarn) == said
