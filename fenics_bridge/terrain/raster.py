@@ -243,7 +243,7 @@ def _check_heights(raster: Any, name: str) -> None:
     gaps = np.argwhere(~np.isfinite(raster.values))
     if len(gaps):
         at = raster.x[gaps[0][1]], raster.y[gaps[0][0]]
-        raise InputError(f"path: {name!r} has {len(gaps)} gaps, the first one at x = {at[0]:g} m, y = {at[1]:g} m; fill them, "
+        raise InputError(f"path: {name!r} has {len(gaps)} gap{'s' * (len(gaps) > 1)}, the first one at x = {at[0]:g} m, y = {at[1]:g} m; fill them, "
                          "for instance by gdal_fillnodata, or take a window without any")  # fmt: skip
     steep = np.abs(np.diff(raster.values, axis=1)).mean() / raster.spacing
     small = max(np.abs(raster.x).max(), np.abs(raster.y).max()) <= 360

@@ -186,6 +186,9 @@ void check_parameters(const L& law)
                  (parameter.upper.included ? " (or infinite)" : "");
       else if (!has_limit)
         range += " and finite";
+      for (const Bound<L>* bound : {&lower, &upper})
+        if (bound->other)
+          range += "; " + std::string(bound->name) + " is " + number_text(bound->of(law));
       refuse(parameter.name, value, range);
     }
 }

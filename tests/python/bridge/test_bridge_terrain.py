@@ -64,7 +64,7 @@ def text_of(tmp_path, change=lambda text: text):
         (lambda t: t.replace("ncols 9", "ncols 8"), "has 63 heights, expected 8 columns by 7 rows"),
         (lambda t: t.replace("ncols 9", "ncols nine"), "has no number for ncols"),
         (lambda t: t.replace("50.2", "high"), "could not convert"),
-        (lambda t: t.replace(" 50.6 ", " -9999 "), r"has 1 gaps, the first one at x = 102 m, y = 212 m"),
+        (lambda t: t.replace(" 50.6 ", " -9999 "), r"has 1 gap, the first one at x = 102 m, y = 212 m"),
         (lambda t: t.replace("cellsize 2.0", "cellsize 0.00002"), "seem to be in degrees"),
         (lambda t: "", "expected an ESRI ASCII grid"),
     ],

@@ -110,11 +110,14 @@ def test_every_parameter_is_in_help_signature_and_representation(law):
 
 def test_a_bound_that_is_another_parameter_holds():
     with pytest.raises(
-        mpm.InputError, match=r"^dilation_angle = 31, but it must be in \[0, friction_angle\] \[degrees\]"
+        mpm.InputError,
+        match=r"^dilation_angle = 31, but it must be in \[0, friction_angle\] \[degrees\]; friction_angle is 30$",
     ):
         mpm.MohrCoulomb(young=1e7, poisson=0.3, cohesion=1e4, friction_angle=30.0, dilation_angle=31.0)
     clay = allowed(mpm.CamClay)
-    with pytest.raises(mpm.InputError, match="^compression = 0.5, but it must be above swelling"):
+    with pytest.raises(
+        mpm.InputError, match="^compression = 0.5, but it must be above swelling and finite; swelling is 0.5$"
+    ):
         mpm.CamClay(**{**clay, "swelling": 0.5, "compression": 0.5})
 
 
