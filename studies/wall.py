@@ -137,7 +137,7 @@ def too_fast(a: Namespace) -> str:
     On cells of a tenth of the height, active and passive coefficients are right to 7 % where the motion takes 23 times as long as a wave
     of pressure over the height of the wall, and wrong by a fifth and more where it takes 7 times as long.
     """
-    wave = a.height / float(np.sqrt(1.346 * a.young / a.density))  # Poisson's ratio of 0.3
+    wave = a.height / float(np.sqrt(sand(a).p_wave_modulus / a.density))
     if a.motion == "free" or a.movement / a.speed >= SLOW * wave:
         return ""
     return (
@@ -148,6 +148,11 @@ def too_fast(a: Namespace) -> str:
 
 
 # --- 2. Sand and wall ------------------------------------------------------------------------------------------------
+
+
+def sand(a: Namespace) -> mpm.MohrCoulomb:
+    return mpm.MohrCoulomb(young=a.young, poisson=0.3, cohesion=a.cohesion, friction_angle=a.friction_angle,
+                           dilation_angle=a.dilation_angle)  # fmt: skip
 
 
 def is_passive(a: Namespace) -> bool:
@@ -180,14 +185,12 @@ def bounds(a: Namespace) -> tuple[float, float]:
 def davis_bound(a: Namespace) -> float | None:
     """Coefficient by a field of stresses with the strength on slip lines of sand that dilates by less than its friction angle [-].
 
-    tan(phi*) = sin(phi) cos(psi) / (1 - sin(phi) sin(psi)) (Davis 1968). None behind smooth walls, where Rankine's coefficient is
-    exact, and for sand that dilates by its friction angle.
+    None behind smooth walls, where Rankine's coefficient is exact, and for sand that dilates by its friction angle.
     """
     if a.wall_friction_angle == 0 or a.dilation_angle == a.friction_angle:
         return None
-    phi, psi, delta = np.radians([a.friction_angle, a.dilation_angle, a.wall_friction_angle])
-    reduced = np.arctan(np.sin(phi) * np.cos(psi) / (1 - np.sin(phi) * np.sin(psi)))
-    return stress_field(reduced, min(delta, reduced), passive=is_passive(a))
+    phi, delta = np.radians([bridge.davis_strength(sand(a)).friction_angle, a.wall_friction_angle])
+    return stress_field(phi, min(delta, phi), passive=is_passive(a))
 
 
 def wall_mass(a: Namespace) -> float:
@@ -232,9 +235,7 @@ def build(a: Namespace) -> mpm.Model:
     left = cell * round(before * h / cell)
     body = ((left, cell), (left + 2 * behind * h, cell + h))  # over a row of empty cells
     mesh = bridge.box_mesh(comm, np.array(counts) * cell, counts, body=body)
-    sand = mpm.MohrCoulomb(young=a.young, poisson=0.3, cohesion=a.cohesion, friction_angle=a.friction_angle,
-                           dilation_angle=a.dilation_angle)  # fmt: skip
-    model = mpm.Model(bridge.background_mesh(*mesh), sand)
+    model = mpm.Model(bridge.background_mesh(*mesh), sand(a))
     if a.restart is not None:
         model.restore(a.restart)
         return model
