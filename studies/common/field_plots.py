@@ -266,15 +266,19 @@ def _soil_names(axes: Axes, soils: Mapping[str, np.ndarray]) -> None:
                   path_effects=[withStroke(linewidth=1.6, foreground="#202020")])  # fmt: skip
 
 
+def near_raster(points: np.ndarray, spacing: float) -> np.ndarray:
+    """The rows of the points (n, 2) that are nearest to those of a raster of a spacing [m], one for each of these."""
+    raster = np.rint(points / spacing)
+    order = np.argsort(np.linalg.norm(points - spacing * raster, axis=1))
+    _, first = np.unique(raster[order], axis=0, return_index=True)
+    return order[first]
+
+
 def _arrows(axes: Axes, field: Field, lower: np.ndarray, upper: np.ndarray) -> None:
     """Arrows at about 20 x 20 places, at nodes that are nearest to them."""
     spacing = (upper - lower).max() / 22
     inside = np.flatnonzero(np.all((field.points >= lower) & (field.points <= upper), axis=1))
-    raster = np.rint(field.points[inside] / spacing)
-    distance = np.linalg.norm(field.points[inside] - spacing * raster, axis=1)
-    order = np.argsort(distance)
-    _, first = np.unique(raster[order], axis=0, return_index=True)
-    nodes = inside[order[first]]
+    nodes = inside[near_raster(field.points[inside], spacing)]
     lengths = np.linalg.norm(field.values, axis=1)
     nodes = nodes[lengths[nodes] > 0.06 * lengths.max()]
     scale = lengths.max() / (1.3 * spacing)

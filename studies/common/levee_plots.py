@@ -12,6 +12,7 @@ from matplotlib.collections import LineCollection
 from particle_player import boundary_edges
 
 from .earthquake_plots import ground_figure
+from .field_plots import near_raster
 from .figures import curve_figure, paper_style, save_figure
 from .history import History
 from .plots import CURVES, DISPLACEMENT, WIDTH, colour_limits, draw_bar
@@ -106,10 +107,7 @@ def _arrows(axes: Axes, points: np.ndarray, moved: np.ndarray, longer: float, la
 
     largest: displacement at the end of the colour scale [m]; where it is far smaller there are no arrows
     """
-    raster = np.rint(points / _spacing(points))
-    order = np.argsort(np.linalg.norm(points - _spacing(points) * raster, axis=1))
-    _, first = np.unique(raster[order], axis=0, return_index=True)
-    nodes = order[first]
+    nodes = near_raster(points, _spacing(points))
     nodes = nodes[np.linalg.norm(moved[nodes], axis=1) > 0.08 * largest]
     arrows = axes.quiver(*points[nodes].T, *moved[nodes].T, angles="xy", scale_units="xy", scale=1 / longer, width=0.0026,
                          color="white", edgecolor="#202020", linewidth=0.4, zorder=4)  # fmt: skip

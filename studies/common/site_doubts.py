@@ -16,12 +16,16 @@ DEEPEST = 3.0
 """Depth of water over the top of a mesh, over the height of the mesh, above which a level is probably a mistake"""
 
 
+def ends_of_height(domain: Any) -> tuple[float, float]:
+    """Height of the lowest and of the highest point of a mesh [m]. Collective."""
+    height = domain.geometry.x[:, domain.geometry.dim - 1]
+    low, high = zip(*domain.comm.allgather((height.min(initial=np.inf), height.max(initial=-np.inf))))
+    return float(min(low)), float(max(high))
+
+
 def warn_of_depth(domain: Any, levels: Iterable[float], where: str) -> None:
     """Warn of the highest of some levels of water [m] if it is far above a mesh; where: it stands in the file. Collective."""
-    height = domain.geometry.x[:, domain.geometry.dim - 1]
-    ends = domain.comm.allgather((height.min(initial=np.inf), height.max(initial=-np.inf)))
-    low, high = min(low for low, _ in ends), max(high for _, high in ends)
-    level = max(levels)
+    (low, high), level = ends_of_height(domain), max(levels)
     if level - high > DEEPEST * (high - low):
         say(f"{where} is {level:g} m, {level - high:.3g} m above the top of the mesh, which is {high - low:.3g} m high: levels are elevations "
             "in m, not depths or pressures")  # fmt: skip

@@ -21,6 +21,7 @@ from .lengths import metres
 from .page import Page
 from .quiet import NOT_REACHED, without_warning
 from .results import open_results
+from .site_doubts import ends_of_height
 from .site_slides import CAPTIONS as SLIDE_CAPTIONS
 from .slope_site import SlopeSite, read_slope_site
 from .summary import write_summary
@@ -94,9 +95,9 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
 
 def rests_all_the_same(a: Namespace, slope: SlopeSite, summary: Mapping[str, Any]) -> str:
     """Why particles hardly slide where the factor of safety is below 1; empty where they slide, or have no other strength. Collective."""
-    heights = comm.allgather(slope.body[0].geometry.x[:, 1])
-    moved, height = summary.get("largest_displacement_m", np.inf), float(np.ptp(np.concatenate(heights)))
-    rests = summary.get("slide_comes_to_rest", False) and moved <= LITTLE * height
+    low, high = ends_of_height(slope.body[0])
+    moved = summary.get("largest_displacement_m", np.inf)
+    rests = summary.get("slide_comes_to_rest", False) and moved <= LITTLE * (high - low)
     if not (rests and a.davis and locks_at_failure(slope.site.laws.values())):
         return ""
     return (
