@@ -24,7 +24,10 @@ if TYPE_CHECKING:
     from fenics_bridge.water.consolidation import Consolidation
 
 NOTHING = 1e-6
-"""Part of the load that is round-off [-], and height by which a pressure may miss its bound [m]"""
+"""Part of the load that is round-off [-]"""
+
+MISSED = 1e-6
+"""Pressure head by which a pressure at its upper bound may miss it [m]"""
 
 BALANCED = 1e-5
 """Change of the forces, over all forces, that an equilibrium may leave (`Solver.relaxed_tolerance`); more with a coarser tolerance"""
@@ -151,7 +154,7 @@ def _diffusivity(model: Any) -> NDArray[np.float64]:
 def _drained(model: Any, end: float) -> NDArray[np.bool_]:
     """Which dofs of the pressure have a given one at a time [s], or are where water leaves now."""
     fixed, _, upper = model._applied.bounds(end)
-    full = model.pressure.x.array >= model.water.unit_weight * (upper - NOTHING)
+    full = model.pressure.x.array >= model.water.unit_weight * (upper - MISSED)
     fluxes = [held.dofs for held in model._applied.held if isinstance(held.condition, Flux)]
     drained = fixed | (np.isfinite(upper) & full)
     for dofs in fluxes:
