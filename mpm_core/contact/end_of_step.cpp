@@ -215,6 +215,16 @@ EndRadius radius_at_end(const Particles<G::dim>& particles, Index p, double volu
 }
 
 template <int D>
+Vector<D> edge_at_start(SeenSurface<D>& seen, double radius, const Vector<D>& x)
+{
+  const Vector<D> normal = distance_at<D>(seen, seen.contact.body, x).normal;
+  Vector<D> edge;
+  for (int i = 0; i < D; ++i)
+    edge[i] = x[i] - radius * normal[i];
+  return edge;
+}
+
+template <int D>
 bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring& spring, const WaterShare& water,
                     double radius, const Vector<D>& x, const Vector<D>& u, const Vector<D>& old, bool tangent,
                     EndTouch<D>& touch)
@@ -286,6 +296,7 @@ EndTouch<D> tied_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spr
   template EndTouch<D> tied_at_end<D>(SeenSurface<D>&, const RigidBody<D>&, const Spring&, const Vector<D>&,           \
                                       const Vector<D>&, const Vector<D>&);                                             \
   template RigidBody<D> body_at_end<D>(const Contact<D>&, const TimeStep&, bool, const Motion<D>&);                    \
+  template Vector<D> edge_at_start<D>(SeenSurface<D>&, double, const Vector<D>&);                                      \
   template bool touches_at_end<D>(SeenSurface<D>&, const RigidBody<D>&, const Spring&, const WaterShare&, double,      \
                                   const Vector<D>&, const Vector<D>&, const Vector<D>&, bool, EndTouch<D>&);
 INSTANTIATE(2)

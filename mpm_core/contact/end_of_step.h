@@ -18,6 +18,11 @@
 /// else of the size is that at the start. The onset is smooth so that short enough steps always converge: a kink would
 /// look the same to any step. The tangent is that of this force; the curvature H = dn/dx of the surface is found by
 /// differences of its normal.
+///
+/// The force acts on the soil at the edge of the particle, x - r_p n at the step's start, by the linear functions of
+/// the particle's cell, also beyond that cell: there the stress of the soil ends, which balances all of the force then.
+/// At the particle's centre its lever would be too short, and the cells at a surface would feel a part of the force
+/// only.
 
 #include "contact/touch.h"
 
@@ -75,6 +80,12 @@ struct EndRadius
 /// @param u  displacement of the particle [m]
 template <class G>
 EndRadius radius_at_end(const Particles<G::dim>& particles, Index p, double volumetric, const Vector<G::dim>& u);
+
+/// The point of a particle that is nearest to a surface at the start of a step [m].
+/// @param radius  of the particle [m]
+/// @param x       its place [m]
+template <int D>
+Vector<D> edge_at_start(SeenSurface<D>& seen, double radius, const Vector<D>& x);
 
 /// A particle that touches a surface at the end of a step.
 template <int D>

@@ -51,8 +51,11 @@ void find_touching(const Model<G>& model, SeenSurface<D> seen, const std::vector
     else
       touches = touches_at_end<D>(seen, trial.end, found.spring, found.water, found.radius.value, x, u,
                                   slip_of<D>(slips, p), tangents, found.touch);
-    if (touches)
-      trial.touching.push_back(found);
+    if (!touches)
+      continue;
+    const Vector<D> edge = bonds ? x : edge_at_start<D>(seen, particle_radius<G>(model.particles, p), x);
+    found.share = weights_at<D>(model.mesh.shapes[run.cell], edge);
+    trial.touching.push_back(found);
   }
 }
 
@@ -105,7 +108,7 @@ void share_with_water(Model<G>& model, const ImplicitStep<G>& step, double trave
   const std::vector<double> areas =
       contact::areas_per_force<D>(mesh, model.exchange, step.cells, step.pore.around, pressed_nodes(model, trial));
   const auto* slips = columns_of(model.particles, contact.slip);
-  for (auto& [p, cell, touch, spring, water, radius, u] : trial.touching)
+  for (auto& [p, cell, touch, spring, water, radius, u, share] : trial.touching)
   {
     const Vector<D> x = at<D>(model.particles.position, p);
     const auto weights = weights_at<D>(mesh.shapes[cell], x);
@@ -123,28 +126,30 @@ void share_with_water(Model<G>& model, const ImplicitStep<G>& step, double trave
 
 /// Adds the derivatives of the force on a particle to those of all that touch in its cell.
 template <class G, int D = G::dim>
-void add_derivatives(const TouchingParticle<D>& at_surface, const PoreStep<D>& pore,
-                     const std::array<double, D + 1>& weights, CellContact<D>& in_cell)
+void add_derivatives(const Model<G>& model, const TouchingParticle<D>& at_surface, const PoreStep<D>& pore,
+                     CellContact<D>& in_cell)
 {
   const EndTouch<D>& touch = at_surface.touch;
   const Index cell = at_surface.cell;
+  const auto& share = at_surface.share;
+  const auto weights = weights_at<D>(model.mesh.shapes[cell], at<D>(model.particles.position, at_surface.particle));
   Matrix<D> stiffness = touch.stiffness;
   for (int i = 0; i < D; ++i)
     stiffness[i][0] -= touch.by_radius[i] * at_surface.radius.by_motion;
   for (std::size_t k = 0; k <= D; ++k)
     for (int i = 0; i < D; ++i)
     {
-      in_cell.by_volumetric[k][i] -= weights[k] * touch.by_radius[i] * at_surface.radius.by_volumetric;
+      in_cell.by_volumetric[k][i] -= share[k] * touch.by_radius[i] * at_surface.radius.by_volumetric;
       for (std::size_t l = 0; l <= D; ++l)
         for (int j = 0; j < D; ++j)
-          in_cell.blocks[k][l][i][j] += weights[k] * weights[l] * stiffness[i][j];
+          in_cell.blocks[k][l][i][j] += share[k] * weights[l] * stiffness[i][j];
     }
   for (int l = 0; l <= D && pore.flows; ++l)
   {
     const double by_node = pressure_by_node(pore, cell, l) / volume_of(pore.cells[cell]);
     for (int k = 0; k <= D; ++k)
       for (int a = 0; a < D; ++a)
-        in_cell.by_water[k][l][a] += weights[k] * touch.by_water[a] * by_node;
+        in_cell.by_water[k][l][a] += share[k] * touch.by_water[a] * by_node;
   }
 }
 
@@ -156,10 +161,10 @@ void scatter(const Model<G>& model, std::span<const TouchingParticle<D>> particl
   for (const TouchingParticle<D>& at_surface : particles)
   {
     const Index cell = at_surface.cell;
-    const auto weights = weights_at<D>(model.mesh.shapes[cell], at<D>(model.particles.position, at_surface.particle));
     for (std::size_t k = 0; k <= D; ++k)
       for (int i = 0; i < D; ++i)
-        step.forces[static_cast<std::size_t>(model.mesh.cells[cell][k])][i] += weights[k] * at_surface.touch.force[i];
+        step.forces[static_cast<std::size_t>(model.mesh.cells[cell][k])][i] +=
+            at_surface.share[k] * at_surface.touch.force[i];
     if (!tangents)
       continue;
     if (step.number_of_cell[cell] == none)
@@ -167,7 +172,7 @@ void scatter(const Model<G>& model, std::span<const TouchingParticle<D>> particl
       step.number_of_cell[cell] = static_cast<Index>(step.cells.size());
       step.cells.push_back({});
     }
-    add_derivatives<G>(at_surface, pore, weights, step.cells[static_cast<std::size_t>(step.number_of_cell[cell])]);
+    add_derivatives<G>(model, at_surface, pore, step.cells[static_cast<std::size_t>(step.number_of_cell[cell])]);
   }
 }
 
@@ -269,7 +274,7 @@ void keep_slip(Model<G>& model, const ImplicitStep<G>& step)
     auto* slips = columns_of(model.particles, contact.slip);
     for (std::size_t i = 0; slips && i < D; ++i)
       std::ranges::fill((*slips)[i], 0.0);
-    for (const auto& [p, cell, touch, spring, water, radius, u] : step.contact.surfaces[k].touching)
+    for (const auto& [p, cell, touch, spring, water, radius, u, share] : step.contact.surfaces[k].touching)
     {
       for (std::size_t i = 0; slips && i < D; ++i)
         (*slips)[i][p] = touch.slip[i];

@@ -15,7 +15,8 @@ struct TouchingParticle
   Spring spring;
   WaterShare water;
   EndRadius radius;
-  Vector<D> displacement; ///< in the step [m]
+  Vector<D> displacement;          ///< in the step [m]
+  std::array<double, D + 1> share; ///< of the force that each vertex of its cell takes
 };
 
 /// A surface in the trial.

@@ -131,7 +131,7 @@ void add_particle(const Model<G>& model, const TouchingParticle<D>& at_surface, 
       const auto node = static_cast<std::size_t>(model.mesh.cells[cell][k]);
       for (std::size_t i = 0; i < D; ++i)
       {
-        driven.column[node][i] -= weights[k] * by.particle_by_body[a][i];
+        driven.column[node][i] -= at_surface.share[k] * by.particle_by_body[a][i];
         driven.row[node][i] += weights[k] * by.body_by_particle[a][i];
       }
       driven.row[node][0] += weights[k] * by.body_by_radius[a] * at_surface.radius.by_motion;

@@ -100,5 +100,6 @@ def undrained_friction(model: Model, until: float) -> str:
         return ""
     return (
         f"the pore water needs {drains:.3g} s to flow through a cell and the run ends at {until:.3g} s: the friction of soil that does not "
-        "drain on rigid surfaces is uncertain by half; adhesion does not depend on the pore pressure (docs/contact.md)"
+        "drain is uncertain by half where rigid surfaces cut cells; let the mesh follow them, or use adhesion, which does not depend on "
+        "the pore pressure (docs/contact.md)"
     )

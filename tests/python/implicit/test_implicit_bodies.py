@@ -144,7 +144,8 @@ def test_a_disc_rolls_down_a_slope():
     dt, steps, slope = 0.02, 20, np.radians(30.0)
     model = mpm.Model(box((32, 12), (2.4, 0.9)), mpm.LinearElastic(young=5e6, poisson=0.3))
     size = 0.0125
-    points = size * (np.indices((192, 8)).reshape(2, -1).T + 0.5)
+    column, row = np.indices((192, 8)).reshape(2, -1)
+    points = size * np.column_stack([column + 0.4 + 0.2 * (row % 2), row + 0.5])  # none on the diagonal of a square
     model.seed_points(points, np.full(len(points), size**2), density=2000.0)
     rollers(model, axes=[0])
     model.fix(3)
