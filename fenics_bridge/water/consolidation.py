@@ -145,6 +145,7 @@ class Consolidation(ConsolidationResults):
         self._wet = cells_there(domain, cell_tags, ())
         self._wet.x.array[np.setdiff1d(np.arange(len(self._wet.x.array)), np.concatenate(self._soils[2]))] = 0.0
         self._held, self._holding = 0.0, (0.0, 0.0)
+        self._standing: Any = None  # nodal forces of the water that stands in the state, None before a step
         self.degree = element.value
         """Degree of the displacement"""
         self._element, self._nmd = element, nmd
@@ -263,7 +264,7 @@ class Consolidation(ConsolidationResults):
 
         The steps that follow release what is then out of balance, such as the weight of soil that is placed, while the water
         flows: in equal parts per time over `duration`, or in the next step. `load` and `boundary` hold for the soil that is
-        there: give the latter its new surfaces.
+        there: give the latter its new surfaces. Water that rises or falls beside the soil that comes or goes does so at once.
 
         Args:
             off: cell tags or names of the soils that are not there; all others are.
@@ -318,6 +319,7 @@ class Consolidation(ConsolidationResults):
         self._body.accept()
         self.points.time = self.time = end
         self._external, self._active = external, active
+        self._standing = self._reservoirs.forces(end)
         self._read_pressure()
         error = self.stored_water() - stored - dt * self.inflow(None)
         return ConsolidationReport(end, dt, iterations, report.residuals, error)

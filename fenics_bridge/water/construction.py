@@ -42,7 +42,7 @@ def reconfigure(
     had_none = model._waterless
     model._configure()
     _fill_pores(model, had_none, pressures)
-    _hold(model, duration)
+    _hold(model, duration, _risen(model, was_there))
 
 
 def lonely_dofs(model: Any) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -107,13 +107,30 @@ def _fill_pores(model: Any, had_none: NDArray[np.int32], pressures: NDArray[np.f
     model._read_pressure()
 
 
-def _hold(model: Any, duration: float) -> None:
-    """Hold what is out of balance now; the steps that follow release it."""
+def _risen(model: Any, was_there: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Nodal forces of water that stands higher or lower than in the last step, but for nodes of soil that comes or goes. Collective.
+
+    The pores below follow the water at once, and so must its weight. At soil that comes or goes the weight of both changes together.
+    """
+    rise = np.zeros(len(model._body.solution.x.array))
+    if model._standing is None:
+        return rise
+    changed = fem.Function(model._there.function_space)
+    changed.x.array[:] = (model._there.x.array > 0) != was_there
+    displacements, dofs = model._displacements
+    kept = dofs.reshape(-1, model.domain.geometry.dim)[lonely_nodes(displacements, changed)]
+    rise[kept] = (model._reservoirs.forces(model.time) - model._standing + rise)[kept]
+    return rise
+
+
+def _hold(model: Any, duration: float, risen: NDArray[np.float64]) -> None:
+    """Hold what is out of balance now, but for the forces of water that has risen; the steps that follow release it."""
     body, dofs = model._body, model._displacements[1]
     body.increment.x.array[:] = 0.0
     model._held, model._holding = 0.0, (model.time, duration)
     external = model._external_at(model.time)
     internal = body.kinematics.internal_forces(model.points.stress).array
-    model._held = np.zeros_like(internal)
-    model._held[dofs] = internal[dofs] - external[dofs]
-    model._external = external + model._held
+    held = np.zeros_like(internal)
+    held[dofs] = internal[dofs] - external[dofs]
+    model._held, model._external = held + risen, external + held
+    model._standing = model._reservoirs.forces(model.time) - risen

@@ -118,11 +118,13 @@ def _up(value: float) -> float:
 def _forces_to_come(model: Any, end: float) -> NDArray[np.float64] | None:
     """Sum of the nodal forces of each cell of this rank that a step brings, (m,); None where it brings none. Collective.
 
-    Standing water that rises or falls does not count: the pores follow it at once, as its pressure on the soil does.
+    Standing water that rises or falls does not count, nor that of a reservoir in the place of another: the pores follow it at once, as
+    its pressure on the soil does.
     """
     (space, dofs), domain, body = model._displacements, model.domain, model._body
-    standing, before = model._reservoirs, body.increment.x.array.copy()
-    external = model._external_at(end) - standing.forces(end) + standing.forces(model.time)
+    water, before = model._reservoirs, body.increment.x.array.copy()
+    standing = water.forces(model.time) if model._standing is None else model._standing
+    external = model._external_at(end) - water.forces(end) + standing
     body.increment.x.array[:] = 0.0
     forces = external - body.kinematics.internal_forces(model.points.stress).array
     body.increment.x.array[:] = before

@@ -36,7 +36,7 @@ def set_initial_state(model: Any, stress: Any, pore_pressure: Any) -> None:
     if pressure is not None:
         solution.x.array[model._pressures[1]] = pressure / model._unit
         solution.x.array[model._pressures[1][model._waterless]] = 0.0
-    model._held = 0.0
+    model._held, model._standing = 0.0, None
     model._read_pressure()
 
 

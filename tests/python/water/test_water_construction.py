@@ -116,6 +116,21 @@ def test_clay_that_is_dug_away_under_water_lets_the_ground_heave():
     assert _settled(model) == pytest.approx(-buoyant * LAYER / M * layer_settled(0.3), rel=0.01)
 
 
+@ELEMENTS
+@pytest.mark.parametrize("fill", [False, True])
+def test_level_ground_rests_while_the_water_over_it_rises_in_a_stage_that_takes_time(element, fill):
+    """Pores below follow the water at once, and so does its weight, which is not held as that of a fill far away is."""
+    columns = 40
+    model = _model(_ground(8.0, columns, 10, 30), element, boundary=[water.Reservoir(GROUND, 3.0)])
+    model.initialise(pore_pressure=lambda x: OF_WATER * (3.0 - x[:, 1]))
+    _run(model, 0.05, 0.05)
+    model.boundary = [water.Reservoir(GROUND, 1.5)]
+    model.reconfigure(off=[SECOND] if fill else [FIRST, SECOND], duration=2 * PERIOD)
+    _run(model, 0.2, 0.05)
+    far = abs(model.evaluate_at([[7.9, 1.0]])["displacement"]).max()
+    assert far < (3e-3 if fill else 1e-12) * 1.5 * OF_WATER / M  # the fill moves the ground beside it a little
+
+
 def test_a_fill_that_dries_weighs_what_its_water_leaves():
     loam = water.VanGenuchten(alpha=5e-4, n=2.0, residual=0.1)
     fill = water.PorousSoil(1e-6, porosity=0.4, retention=loam)

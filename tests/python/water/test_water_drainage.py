@@ -134,6 +134,22 @@ def test_water_that_rises_over_level_ground_is_not_warned_of_as_the_ground_does_
     assert (moved > 1e-6) if load else (moved < 1e-12)
 
 
+@ELEMENTS
+@pytest.mark.parametrize("duration", [None, 0.0, 1e3])
+@pytest.mark.parametrize("level", [1.5, 5.0])
+def test_a_reservoir_in_the_place_of_another_is_not_warned_of_but_the_load_after_it_is(element, duration, level):
+    column = Column(element, CELLS, boundary=[water.Reservoir(TOP, 3.0)], load=0.0)
+    column.model.initialise(pore_pressure=lambda x: GRAVITY_OF_WATER * (3.0 - x[:, -1]))
+    dt = first_step(column, 3.0)
+    column.model.run(dt, dt)
+    column.model.boundary = [water.Reservoir(TOP, level)]
+    if duration is not None:
+        column.model.reconfigure(duration=duration)
+    assert warned(lambda: column.model.run(2 * dt, dt)) == (0, "")
+    column.model.load = bridge.Load(unit_weight=GRAVITY_OF_WATER, pressure={TOP: 10e3})
+    assert warned(lambda: column.model.run(3 * dt, dt))[0] == 1
+
+
 @pytest.mark.parametrize("ratio, count", [(3.0, 1), (0.95, 0)])
 def test_a_run_that_ends_within_its_first_step_asks_for_no_load_beyond_and_is_judged_by_this_step(ratio, count):
     """As runs from one output to the next do while a load grows: it is not the step that is too short."""
