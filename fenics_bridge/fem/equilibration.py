@@ -36,7 +36,7 @@ class EquilibriumReport:
     """Out-of-balance force over the forces at work [-], before each iteration of Newton's method (or step of relaxation) and at
     the end"""
     reason: str
-    """Why there is no equilibrium; empty otherwise"""
+    """Why there is no equilibrium, with place and advice; empty otherwise"""
     iterations: int
     """Linear systems solved, or explicit steps made"""
     relaxation: Relaxation | None = None
@@ -45,6 +45,8 @@ class EquilibriumReport:
     """Displacement of the step, or of the mechanism where it fails, per degree of freedom [m]"""
     explicit: bool = False
     """Whether the iterations are explicit steps of particles"""
+    cause: str = ""
+    """The reason without place and advice, for a line on one step of several; empty where the reason has none"""
 
     def __repr__(self) -> str:
         count = f"{self.iterations} {'explicit steps' if self.explicit else 'linear systems'}"

@@ -140,8 +140,9 @@ def print_step(step: LoadStep) -> None:
     if MPI.COMM_WORLD.rank != 0:
         return
     report = step.report
-    why = report.reason if np.isnan(report.carried) else f"the stresses carry {report.carried:.2%} of the load"
-    state = {"equilibrium": "ok", "failure": f"fails: {why}"}.get(report.outcome, f"undecided ({report.reason})")
+    cause = report.cause or report.reason
+    why = cause if np.isnan(report.carried) else f"the stresses carry {report.carried:.2%} of the load"
+    state = {"equilibrium": "ok", "failure": f"fails: {why}"}.get(report.outcome, f"undecided ({cause})")
     print(
         f"step {step.number:3d}  {step.quantity} {step.value:<12.6g} size {step.size:<10.3g} "
         f"{report.method} {report.iterations:2d}  residual {report.residuals[-1]:.1e}  {state}",

@@ -291,7 +291,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
             self.load, self.law = self._loads.resolved(load), law
             return report
         self._follow(self.laws)
-        return replace(report, reason=explained(self, report.reason, load))
+        return replace(report, reason=explained(self, report.reason, load), cause=report.reason)
 
     def _follow(self, laws: Sequence[Any]) -> Any:
         """Let averaged forces follow the laws. Collective."""

@@ -294,6 +294,15 @@ def test_progress_names_every_step(capsys):
     assert len(lines) == len(steps) and "Newton" in lines[0] and "residual" in lines[0]
 
 
+def test_the_line_on_an_undecided_step_has_no_advice(capsys):
+    model = slope_model(solver=bridge.Solver(max_steps=2))
+    steps = model.solve(bridge.Load(unit_weight=60e3), progress=bridge.print_step)
+    lines = capsys.readouterr().err.splitlines()
+    undecided, line = next((s.report, line) for s, line in zip(steps, lines) if s.report.outcome == "undecided")
+    assert line.endswith(f"undecided ({undecided.cause})") and undecided.cause.endswith("after 2 steps of relaxation")
+    assert undecided.reason.startswith(f"{undecided.cause}; under unit weight") and "more dilation" in undecided.reason
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [
