@@ -117,7 +117,7 @@ class Files(FieldFiles):
         super().__init__(model.domain, folder / "consolidation", folder / "history.csv", columns)
         self.pictures: list[ExcessPicture | None] = []
         self.film: list[ExcessPicture | None] = []
-        self._filmed = filmed
+        self._filmed, self._framed = filmed, -np.inf
 
     def row(self, report: water.ConsolidationReport | None = None) -> None:
         """Add settlements and the largest excess pressure to the history. Collective."""
@@ -138,8 +138,11 @@ class Files(FieldFiles):
             self.film.append(self._picture())
 
     def frame(self) -> None:
-        """Add pressures, displacement and stress to the files for ParaView, and a picture. Collective."""
+        """Add pressures, displacement and stress to the files for ParaView, and a picture, once at a time. Collective."""
         model = self._model
+        if model.time == self._framed:  # a run may end right after a frame
+            return
+        self._framed = model.time
         stress = model.stress_function(smooth=True)
         there = bridge.evaluate_at(
             self.points, u=model.displacement, p=model.pressure, excess=self._excess, stress=stress

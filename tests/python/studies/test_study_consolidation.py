@@ -124,6 +124,17 @@ def test_cells_that_are_too_large_for_the_first_step_are_said(options, words, tm
     assert in_options(run.stderr, consolidation.parser()).count("Take a longer --first-step, 0.") == words
 
 
+def test_ground_that_fails_right_after_a_frame_is_not_drawn_twice(tmp_path, monkeypatch, without_pictures):
+    import consolidation
+
+    drawn = []
+    monkeypatch.setattr(consolidation.Files, "_picture", lambda files: drawn.append(files._model.time / 86400.0))
+    options = ["--cell-size", 2, "--days", 4, "--first-step", 0.5, "--frames", 2, "--no-film"]
+    run = ended("consolidation", tmp_path, *options, "--pressures", "footing=0:0,2:1e3,2.00000001:2e6")
+    assert run.returncode != 0 and "no equilibrium was found from 2 days on" in run.stdout + run.stderr
+    assert drawn == [pytest.approx(2.0)]
+
+
 def test_particles_take_no_other_water_than_reservoirs(tmp_path):
     from common.consolidation_site import read_consolidation_site
 
