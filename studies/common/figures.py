@@ -13,6 +13,8 @@ from matplotlib.figure import Figure
 from .files import NOT_WRITTEN, expendable
 from .progress import counted
 
+FEW = 12
+"""Points of a curve below which they are marked"""
 STYLE = Path(__file__).with_name("paper.mplstyle")
 Pictures = Mapping[str, Callable[[], object]]
 """Functions that draw pictures, by the names of their files; called on the first rank only, so without collective calls"""
@@ -67,5 +69,17 @@ def curve_figure(path: Path, size: tuple[float, float] = (4.6, 3.2), panels: int
     """
     with paper_style(), plt.rc_context({"axes.grid": True, "xtick.top": True, "ytick.right": True}):
         figure, axes = plt.subplots(rows, panels, figsize=size, sharex=rows > 1, layout="constrained")
+        figure.get_layout_engine().set(wspace=0.05 * (panels > 1))
         yield axes
+        mark_few(figure)
         save_figure(figure, path)
+
+
+def mark_few(figure: Figure) -> None:
+    """Mark the points of curves that have one, which no line shows, or so few that the line between them says little.
+
+    Lines of two points are those of a constant or a slope.
+    """
+    for line in (line for axes in figure.axes for line in axes.lines):
+        if len(line.get_xdata()) in (1, *range(3, FEW)) and line.get_marker() == "None":
+            line.set(marker="o", markersize=2.5)

@@ -17,6 +17,14 @@ from .plots import ROUND_TICKS, WIDTH, paper_style
 LIGHT = LightSource(azdeg=315, altdeg=45)
 
 
+def hillshade(ground: Raster) -> np.ndarray:
+    """Brightness of the ground in light from the north-west, from 0 to 1; ground that turns away from it still shows its shape."""
+    north, east = np.gradient(ground.values, ground.spacing)
+    normal = np.stack([-east, -north, np.ones_like(east)], axis=-1)
+    shade: np.ndarray = 0.5 + 0.5 * (normal @ LIGHT.direction) / np.linalg.norm(normal, axis=-1)
+    return shade
+
+
 def save_map(path: Path, ground: Raster, shown: Raster, label: str) -> None:
     """Draw a map.
 
@@ -31,8 +39,9 @@ def save_map(path: Path, ground: Raster, shown: Raster, label: str) -> None:
     wide = (extent[1] - extent[0]) / (extent[3] - extent[2])
     with paper_style():
         figure, ax = plt.subplots(figsize=(WIDTH, min(9.0, 0.85 * WIDTH / wide + 0.6)), layout="constrained")
-        shade = LIGHT.hillshade(ground.values, vert_exag=1, dx=ground.spacing, dy=-ground.spacing)  # rows go north
-        ax.imshow(shade, cmap="gray", extent=extent, origin="lower", vmin=-0.3, vmax=1.2, interpolation="bilinear")
+        ax.imshow(
+            hillshade(ground), cmap="gray", extent=extent, origin="lower", vmin=-0.3, vmax=1.1, interpolation="bilinear"
+        )
         lines = ax.contour(x, y, ground.values, levels=ROUND_TICKS.tick_values(ground.values.min(), ground.values.max()),
                            colors="#222222", linewidths=0.6)  # fmt: skip
         for label_of_line in ax.clabel(lines, fmt="%g m", fontsize=7):
