@@ -1,5 +1,7 @@
 """Elasto-plastic equilibrium with the laws of the particles."""
 
+import re
+
 import numpy as np
 import pytest
 from bridge_cases import (
@@ -294,13 +296,19 @@ def test_progress_names_every_step(capsys):
     assert len(lines) == len(steps) and "Newton" in lines[0] and "residual" in lines[0]
 
 
-def test_the_line_on_an_undecided_step_has_no_advice(capsys):
+def test_an_undecided_step_has_a_short_line_and_is_not_what_a_load_fails_at_where_smaller_steps_pass_it(capsys):
     model = slope_model(solver=bridge.Solver(max_steps=2))
-    steps = model.solve(bridge.Load(unit_weight=60e3), progress=bridge.print_step)
+    with pytest.warns(RuntimeWarning, match="was not reached") as caught:
+        steps = model.solve(bridge.Load(unit_weight=60e3), progress=bridge.print_step)
     lines = capsys.readouterr().err.splitlines()
-    undecided, line = next((s.report, line) for s, line in zip(steps, lines) if s.report.outcome == "undecided")
-    assert line.endswith(f"undecided ({undecided.cause})") and undecided.cause.endswith("after 2 steps of relaxation")
-    assert undecided.reason.startswith(f"{undecided.cause}; under unit weight") and "more dilation" in undecided.reason
+    report, line = next((s.report, line) for s, line in zip(steps, lines) if s.report.outcome == "undecided")
+    assert line.endswith(f"undecided ({report.cause})") and report.cause.endswith("after 2 steps of relaxation")
+    assert report.reason.startswith(f"{report.cause}; under unit weight") and "more dilation" in report.reason
+    reached = max(step.value for step in steps if step.converged)
+    assert any(step.value < reached for step in steps if not step.converged)
+    words = r"equilibrium, (\S+)% of the way from the load before: at (\S+)%"
+    said = [float(number) for number in re.search(words, str(caught[0].message)).groups()]
+    assert said[0] == pytest.approx(100 * reached, abs=1e-3) and said[1] > said[0]
 
 
 @pytest.mark.parametrize(
