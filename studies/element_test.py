@@ -30,10 +30,12 @@ import mpm_core as mpm
 
 SOFTEST = 10e3
 """Oedometric modulus [Pa] below which there is no soil: mud has some 50 kPa"""
+LOWEST = 1e3
+"""Pressure [Pa] below which it is more probably one in kPa"""
 OWN_STIFFNESS = ("cam-clay", "nor-sand", "sanisand")
 """Laws whose stiffness follows from the pressure"""
-PRECONSOLIDATED = {"cam-clay": "--preconsolidation", "nor-sand": "--image-pressure"}
-"""Laws with a largest pressure, and the options that set it"""
+PRECONSOLIDATED = {"cam-clay": ("--preconsolidation", 1.0), "nor-sand": ("--image-pressure", np.e)}
+"""Laws that yield under an isotropic pressure, the options that set it, and how many times their value it is, attraction included"""
 TESTS = ("oedometer", "drained", "undrained", "shear", *CYCLIC)
 COLUMNS = ["axial_strain", "shear_strain", "volumetric_strain", "p_Pa", "q_Pa", "shear_stress_Pa",
            "excess_pore_pressure_Pa", "plastic_strain"]  # fmt: skip
@@ -79,6 +81,10 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check(p, own or a.material != "viscoplastic" or a.rate is not None,
           "--material is viscoplastic, expected --rate with it: in an infinitely slow test the viscosity has no effect")  # fmt: skip
     say(in_percent(a))
+    say(
+        f"--pressure is {a.pressure:g} Pa, less than under 0.1 m of soil: {a.pressure:g} kPa are {a.pressure:g}e3"
+        * (0 < a.pressure < LOWEST)
+    )
     return a
 
 
@@ -125,10 +131,11 @@ def check_start(a: Namespace, law: Any) -> None:
     with suppress(mpm.RunError):
         test.step([0.0] * 6, dt=np.inf)
     if np.abs(test.stress[:3] + a.pressure).max() > 1e-6 * a.pressure:
-        name = PRECONSOLIDATED[a.material]
-        value = getattr(a, name.removeprefix("--").replace("-", "_"))
+        name, times = PRECONSOLIDATED[a.material]
+        value, least = getattr(a, name[2:].replace("-", "_")), (a.pressure + a.attraction) / times - a.attraction
         raise mpm.InputError(
-            f"--pressure is {a.pressure:g} Pa, expected one inside of the yield surface, which has {name} {value:g} Pa: raise {name}"
+            f"--pressure is {a.pressure:g} Pa, expected one inside of the yield surface; {name} is {value:g} Pa, raise it to {np.ceil(least):g} Pa "
+            "or more"
         )
 
 

@@ -42,12 +42,13 @@ def test_a_test_that_ends_before_the_soil_yields_is_said(options, said, tmp_path
     "options, refused",
     [
         # without shear stress, Cam-Clay yields at p = p_c
-        ("--material cam-clay --pressure 20.1e3", "--preconsolidation 20000 Pa: raise --preconsolidation"),
-        ("--material cam-clay --pressure 200e3 --undrained", "--preconsolidation 20000 Pa: raise"),
+        ("--material cam-clay --pressure 20.1e3", "--preconsolidation is 20000 Pa, raise it to 20100 Pa or more"),
+        ("--material cam-clay --pressure 200e3 --undrained", "--preconsolidation is 20000 Pa, raise it to 200000 Pa"),
         ("--material cam-clay --pressure 20e3", ""),
         # NorSand at e times the image pressure, both with the attraction: 21 kPa e - 1 kPa = 56.1 kPa
-        ("--material nor-sand --pressure 56.2e3", "--image-pressure 20000 Pa: raise --image-pressure"),
+        ("--material nor-sand --pressure 56.2e3", "--image-pressure is 20000 Pa, raise it to 20043 Pa or more"),
         ("--material nor-sand --pressure 56e3", ""),
+        ("--material nor-sand --pressure 56.2e3 --image-pressure 20043", ""),
     ],
 )
 def test_pressures_outside_of_the_yield_surface_are_refused(options, refused, tmp_path):
@@ -191,6 +192,7 @@ def test_a_bank_of_resting_cells_fails_back_as_one_of_particles(tmp_path):
     "options, words",
     [
         (["--strain", "20"], "warning: --strain is 20, a fraction: 20 % are 0.2"),
+        (["--pressure", "100"], "warning: --pressure is 100 Pa, less than under 0.1 m of soil: 100 kPa are 100e3"),
         (["--test", "shear", "--strain", "20"], "warning: --strain is 20, a fraction"),
         (["--young", "9000"], "under a pressure of 20000 Pa: moduli are in Pa"),  # in kPa
         (["--young", "9", "--pressure", "0"], "under a pressure of 0 Pa: moduli are in Pa"),  # in MPa
