@@ -60,8 +60,8 @@ def parser() -> ArgumentParser:
     """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_number(p, "--depth", 0.5, "m", "depth of the flow", above=0)
-    add_number(p, "--length", None, "-", "ratio of the flow's length to its depth, rounded to whole cells (default: the duration + 6)",
-               at_least=4)  # fmt: skip
+    add_number(p, "--length", None, "-", "ratio of the flow's length to its depth, rounded to whole cells (default: so long that its end is "
+               "not felt at the wall)", at_least=4)  # fmt: skip
     add_number(
         p, "--froude", 2.0, "-", "Froude number, the ratio of the flow's velocity to that of shallow waves", at_least=1
     )
@@ -100,7 +100,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     if a.duration is None:
         a.duration = max(8.0, 2 * rise(a))
     if a.length is None:
-        a.length = a.duration + 6
+        a.length = float(np.ceil(a.duration * length_of_passage(a)))
     wet = a.pressure_ratio > 0
     check_effect(p, a, wet, ("--conductivity", "--porosity", "--water-modulus"), "--pressure-ratio above 0")
     if a.density is None:
@@ -120,6 +120,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check(p, a.length > 2 / np.tan(np.radians(a.front_angle)),
           lambda: f"--length is {a.length:g}, expected more than twice the front's, "
           f"{1 / np.tan(np.radians(a.front_angle)):.3g}")  # fmt: skip
+    say(f"--length is {a.length:g}, so that the end of the flow is felt before its bore has formed at the wall: take {formed(a) * length_of_passage(a):.3g} "
+        "or more" * (formed(a) >= end_felt(a)))  # fmt: skip
     check_whole(p, 1 / a.cell_size, f"--cell-size is {a.cell_size:g}, expected 1 over a whole number, such as 0.125")
     check_cells(p, a, 6 * a.length * (1 + a.froude) / a.cell_size**2, "--cell-size", "--length", "--froude")
     check_restart(p, a, body_runs.MAY_CHANGE)
@@ -148,6 +150,26 @@ def passage(a: Namespace) -> float:
 def rise(a: Namespace) -> float:
     """Time in which sand rises that is thrown up with the velocity of the flow, u / g, in multiples of depth over velocity [-]."""
     return float(a.froude**2)
+
+
+def formed(a: Namespace) -> float:
+    """Time from which the bore is taken as formed, in multiples of depth over velocity [-]."""
+    return float(FULL * rise(a) + 1 / np.tan(np.radians(a.front_angle)))
+
+
+def length_of_passage(a: Namespace) -> float:
+    """Length over depth of the flow that comes to the bore while it moves by its depth, and of that which feels that it ends [-].
+
+    The flow has the velocity u. Its end spreads forwards with that of shallow waves in a fluid, which those of sand do not exceed, and
+    the bore goes back with u / (x - 1) at most, x being the depth behind the bore in sand.
+    """
+    (_, (depth, _)) = bores(a)
+    return float(1 + 1 / a.froude + 1 / (depth - 1))
+
+
+def end_felt(a: Namespace) -> float:
+    """Time at which the end of the flow is felt at its bore, at the earliest, in multiples of depth over velocity [-]."""
+    return float(a.length / length_of_passage(a))
 
 
 def unit_force(a: Namespace) -> float:
@@ -224,9 +246,9 @@ def row(a: Namespace, wall: mpm.RigidContact, history: History, report: mpm.Repo
 
 
 def full_force(a: Namespace, history: History) -> float | None:
-    """Mean force over rho g h^2 since the bore has formed; None where the run ended before."""
-    start = (FULL * rise(a) + 1 / np.tan(np.radians(a.front_angle))) * passage(a)
-    chosen = history["time_s"] >= start
+    """Mean force over rho g h^2 since the bore has formed, until the end of the flow is felt; None where there is no such time."""
+    time = history["time_s"] / passage(a)
+    chosen = (time >= formed(a)) & (time <= end_felt(a))
     return float(history["force_factor"][chosen].mean()) if chosen.any() else None
 
 
@@ -291,7 +313,7 @@ def main(arguments: list[str] | None = None) -> int:
         "largest_force_N_per_m": float(history["force_factor"].max()) * unit_force(a), "velocity_m_per_s": velocity(a),
         "largest_run_up_m": float(history["run_up_m"].max()), "outflow_mass_kg": model.report().outflow_mass,
     }  # fmt: skip
-    shown = "no bore yet" if force is None else f"{1e-3 * force * unit_force(a):.2f} kN/m"
+    shown = "not known without a bore that has formed" if force is None else f"{1e-3 * force * unit_force(a):.2f} kN/m"
     said = (
         f"force of the flow: {shown}; of a bore in a fluid {1e-3 * fluid * unit_force(a):.2f}, in sand under passive pressure "
         f"{1e-3 * passive * unit_force(a):.2f} kN/m"
