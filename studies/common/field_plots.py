@@ -23,7 +23,7 @@ from particle_player import axis_labels, boundary_edges
 from .figures import curve_figure, save_figure
 from .plots import CURVES, ROUND_TICKS, WIDTH, Quantity, Scene, colour_limits, discs, paper_style
 from .soil_outlines import name_places, soil_outlines
-from .water_table import draw_water_table, water_legend
+from .water_table import draw_water_table, top_with_water, water_legend
 
 INCREMENT = Quantity("Displacement increment at collapse, relative", "-", colours="viridis")
 INCREMENT_SHEAR = Quantity("Shear strain increment at collapse, relative", "-", colours="inferno")
@@ -225,11 +225,11 @@ def save_mechanism(
         box: (lower, upper) corner of what is shown; all by default.
         water: segments (k, 2, 2) [m] of the water table, in the soil and over standing water.
     """
-    wet = water is not None and len(water) > 0
+    water = np.empty((0, 2, 2)) if water is None else water
     lengths, shear = np.linalg.norm(field.values, axis=1), field.shear()
     lower, upper = (np.array(corner) for corner in box or (field.points.min(axis=0), field.points.max(axis=0)))
-    if wet and box is None:  # water may stand above all soil
-        upper[1] = max(upper[1], water[..., 1].max())
+    if box is None:
+        upper[1] = top_with_water(lower[1], upper[1], [water])
     with paper_style():
         figure, panels = _panels(lower, upper, 2, field.half_section)
         for (axes, bar), quantity in zip(panels, (INCREMENT, INCREMENT_SHEAR)):
@@ -242,15 +242,14 @@ def save_mechanism(
                            **shown)  # fmt: skip
             for outline in (field.soils or {}).values():
                 axes.add_collection(LineCollection(outline, colors="#a0a0a0", linewidths=0.6, zorder=2))
-            if wet:
-                draw_water_table(axes, water)
+            seen = draw_water_table(axes, water)
             if line is not None:
                 axes.plot(*line.T, "--", color=LINE, linewidth=1.4, label=line_name)
             _bar(figure, bar, quantity, (0.0, 1.0), "max" if is_shear else "neither")
         _arrows(panels[0][0], field, lower, upper)
         panels[0][0].set_title(title, loc="left", pad=4)
         _soil_names(panels[1][0], field.soils or {})
-        if wet:
+        if seen:
             water_legend(panels[1][0])
         if line is not None:
             panels[1][0].legend(loc="lower right", bbox_to_anchor=(1.02, 0.98), fontsize=9)

@@ -24,7 +24,7 @@ from .animation import save_figure_film
 from .field_plots import Field, gathered
 from .figures import save_figure
 from .plots import ROUND_TICKS, Quantity, paper_style
-from .water_table import draw_water_table, polyline_segments, water_legend, zero_line
+from .water_table import draw_water_table, polyline_segments, top_with_water, water_legend, zero_line
 
 HEAD = Quantity("Total head", "m", colours="viridis")
 PRESSURE = Quantity("Pore pressure", "kPa", scale=1e-3, colours="BrBG")
@@ -114,15 +114,16 @@ def save_flow_film(path: Path, pictures: Sequence[FlowPicture], quantity: Quanti
     return save_figure_film(path, pictures, lambda picture: _figure([picture], quantity, scales))
 
 
-def _scales(pictures: Sequence[FlowPicture], quantity: Quantity) -> tuple[np.ndarray, float]:
-    """Values at which the colours of the quantity change, as shown, and the largest velocity [m/s], of all pictures."""
+def _scales(pictures: Sequence[FlowPicture], quantity: Quantity) -> tuple[np.ndarray, float, float]:
+    """Of all pictures: values at which the colours of the quantity change, as shown, largest velocity [m/s] and height shown [m]."""
     every = np.concatenate([picture.values(quantity) for picture in pictures])
     low, high = pressure_limits(pictures) if quantity is PRESSURE else (every.min(), every.max())
     ticks = ROUND_TICKS.tick_values(low, high)
     parts = 2 * (len(ticks) - 1) if quantity is PRESSURE else 20  # so that pressures change their colour at zero
-    return np.linspace(ticks[0], ticks[-1], parts + 1), max(
-        float(np.linalg.norm(one.velocity, axis=1).max()) for one in pictures
-    )
+    fastest = max(float(np.linalg.norm(one.velocity, axis=1).max()) for one in pictures)
+    heights = pictures[0].head.points[:, 1]
+    top = top_with_water(heights.min(), heights.max(), [picture.table() for picture in pictures])
+    return np.linspace(ticks[0], ticks[-1], parts + 1), fastest, top
 
 
 def pressure_limits(pictures: Sequence[FlowPicture]) -> tuple[float, float]:
@@ -153,18 +154,18 @@ def _colours(quantity: Quantity, limits: tuple[float, float]) -> Colormap:
     return ListedColormap(colours(0.5 + 0.5 * values / np.abs(values).max()))
 
 
-def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[np.ndarray, float]) -> Figure:
+def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[np.ndarray, float, float]) -> Figure:
     """A panel for each flow, above one another."""
     points = pictures[0].head.points
     low, high = points.min(axis=0), points.max(axis=0)
-    levels, fastest = scales
-    aspect, limits = (high[1] - low[1]) / (high[0] - low[0]), (levels[0], levels[-1])
+    levels, fastest, top = scales
+    aspect, limits = (top - low[1]) / (high[0] - low[0]), (levels[0], levels[-1])
     colours, norm = _colours(quantity, limits), Normalize(*limits)
     figure, panels = plt.subplots(len(pictures), 1, figsize=(6.9, len(pictures) * (5.8 * aspect + 0.35) + 0.4), sharex=True,
                                   squeeze=False, layout="constrained")  # fmt: skip
     table, least = False, limits[0]
     for axes, picture in zip(panels[:, 0], pictures):
-        axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]), ylabel="$y$ [m]")
+        axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], top), ylabel="$y$ [m]")
         triangles = Triangulation(*picture.head.points.T, picture.head.cells)
         values, lines = picture.values(quantity), levels[1:-1]
         least = min(least, values.min())

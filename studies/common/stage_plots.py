@@ -21,7 +21,7 @@ from particle_player import axis_labels, boundary_edges
 from .field_plots import Field, gathered
 from .figures import Pictures, curve_figure, save_figure
 from .plots import CURVES, Quantity, paper_style
-from .water_table import draw_water_table, level_line, water_legend
+from .water_table import draw_water_table, level_line, top_with_water, water_legend
 
 MOVED = Quantity("Displacement", "mm", scale=1e3, colours="viridis")
 SHEAR = Quantity("Accumulated deviatoric strain", "%", scale=1e2, colours="inferno")
@@ -75,6 +75,7 @@ def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) 
     """Draw a panel for each stage, above one another, in one colour scale: displacement, or strain where `quantity` is SHEAR."""
     box = np.array([stages[0].displacement.points.min(axis=0), stages[0].displacement.points.max(axis=0)])
     is_strain = quantity is SHEAR
+    box[1, 1] = top_with_water(*box[:, 1], [stage.water for stage in stages])
     values = [quantity.scale * (s.strain[s.there] if is_strain else s.moved()) for s in stages]
     drawn = [v if is_strain else v[np.unique(s.field().cells)] for s, v in zip(stages, values)]
     limits = (0.0, max(float(np.quantile(v, 0.995)) for v in drawn) or 1.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,6 +16,10 @@ from fenics_bridge.water.soils import WATER_WEIGHT
 TABLE = "#1f6fd0"
 WIDTH, MARKER = 1.6, 6.0
 """Of the line, and of the triangle over it [points]"""
+HIGHEST = 1 / 3
+"""Depth of water over a body that a picture shows, over the height of the body"""
+MARGIN = 0.06
+"""Height shown above that water, over that of the body"""
 
 
 def zero_line(points: np.ndarray, cells: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -53,6 +57,18 @@ def level_line(
     pressure = np.broadcast_to(pore_pressure(np.column_stack([along, np.full(400, lower[1])])), 400)
     level = np.where(pressure > 0, lower[1] + pressure / WATER_WEIGHT, np.nan)
     return polyline_segments(np.column_stack([along, level]))
+
+
+def top_with_water(lower: float, upper: float, waters: Iterable[np.ndarray]) -> float:
+    """Height up to which a picture of a body shows water that stands over it, up to a third of the height of the body [m].
+
+    Args:
+        lower, upper: of the body [m].
+        waters: segments (k, 2, 2) [m], may be none.
+    """
+    levels = np.concatenate([water[..., 1].ravel() for water in waters] or [[]])
+    shown = levels[(levels > upper) & (levels <= upper + HIGHEST * (upper - lower))]
+    return float(shown.max() + MARGIN * (upper - lower)) if len(shown) else upper
 
 
 def draw_water_table(axes: Axes, segments: np.ndarray) -> bool:

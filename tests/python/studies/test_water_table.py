@@ -129,9 +129,9 @@ def test_the_water_table_and_the_reservoir_are_drawn(monkeypatch):
     assert not water_lines(drawn(monkeypatch, seepage_plots, save_flow, [flow(lambda x: 12 - x[:, 1])]).axes[0])
 
 
-@pytest.mark.parametrize(("level", "named"), [(6.0, True), (12.0, False)])
+@pytest.mark.parametrize(("level", "named"), [(6.0, True), (12.0, True), (14.0, False)])
 def test_only_water_within_a_picture_is_in_its_legend(level, named, monkeypatch):
-    """The soil reaches up to 10 m, and the pictures of flow and of stages with it."""
+    """The soil reaches from 0 to 10 m; all pictures show water that stands up to a third of this over it."""
     water = level_line(bridge.hydrostatic(level), (0.0, 0.0), (20.0, 10.0))
     line = np.concatenate([water[:1, 0], water[:, 1]])
     soil = flow(lambda x: 12 - x[:, 1], [line])  # all of it saturated
@@ -140,11 +140,26 @@ def test_only_water_within_a_picture_is_in_its_legend(level, named, monkeypatch)
         "", at_rest, np.ones(len(at_rest.cells), bool), np.zeros(len(at_rest.cells)), water
     )
     figures = [drawn(monkeypatch, seepage_plots, save_flow, [soil], PRESSURE),
+               drawn(monkeypatch, field_plots, save_mechanism, at_rest, "", water=water),
                drawn(monkeypatch, stage_plots, stage_plots.save_stages, [stage], stage_plots.MOVED)]  # fmt: skip
     for figure in figures:
-        legends = [one for one in figure.axes[0].artists if isinstance(one, Legend)]
+        legends = [one for axes in figure.axes for one in axes.artists if isinstance(one, Legend)]
         assert len(legends) == named == len(triangles(figure.axes[0]))
+        top = figure.axes[0].get_ylim()[1]
+        assert named == (top > level) and top < 13.5
         plt.close(figure)
+
+
+def test_a_film_of_water_that_falls_has_frames_of_one_height(monkeypatch):
+    frames = []
+    monkeypatch.setattr(
+        seepage_plots, "save_figure_film", lambda path, pictures, draw: frames.extend(map(draw, pictures))
+    )
+    levels = [np.array([[0.0, level], [20.0, level]]) for level in (12.0, 8.0)]
+    seepage_plots.save_flow_film(None, [flow(lambda x: 8 - x[:, 1], [level]) for level in levels])
+    first, last = (frame.axes[0].get_ylim() for frame in frames)
+    assert first == last and 12.0 < first[1] < 13.0
+    plt.close("all")
 
 
 # --- mechanisms ------------------------------------------------------------------------------------------------------
