@@ -334,8 +334,8 @@ class Consolidation(ConsolidationResults):
     ) -> list[ConsolidationReport]:
         """Make steps up to a time, each longer than the one before while Newton's method converges quickly. Collective.
 
-        A step that fails is halved. Warns once of cells at a drained boundary under a load that are larger than sqrt(c_v first_step),
-        with c_v = k M / gamma_w: settlements in the first steps are then too large.
+        A step that fails is halved. Warns once of cells at a drained boundary that are larger than sqrt(c_v first_step), with
+        c_v = k M / gamma_w, where a load or head changes: settlements in the first steps are then too large.
 
         Args:
             until: time at the end [s].

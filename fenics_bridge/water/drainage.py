@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.mesh.tagged import owned_cells
-from fenics_bridge.water.boundary import Flux
+from fenics_bridge.water.boundary import Flux, Head
 from fenics_bridge.water.retention import AlwaysSaturated
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def _text(tag: int | str, height: float, ratio: float, dt: float) -> str:
     needed, small = dt * ratio**2, -_up(-height / ratio)
     return (
         f"the cells at the drained boundary {tag!r} are {height:.2g} m high, more than the sqrt(c_v dt) = {small:.2g} m that consolidate in "
-        f"the first step of {dt / DAY:.2g} days: settlements soon after a change of the load are too large. Take a longer first_step, "
+        f"the first step of {dt / DAY:.2g} days: settlements soon after a change of load or head are too large. Take a longer first_step, "
         f"{_up(needed / DAY):.2g} days ({_up(needed):.2g} s), or cells of {small:.2g} m there (docs/water.md)"
     )
 
@@ -118,6 +118,8 @@ def _up(value: float) -> float:
 def _forces_to_come(model: Any, end: float) -> NDArray[np.float64] | None:
     """Sum of the nodal forces of each cell of this rank that a step brings, (m,); None where it brings none. Collective.
 
+    They are those of loads, and of pore pressures that change at a boundary by its head.
+
     Standing water that rises or falls does not count, nor that of a reservoir in the place of another: the pores follow it at once, as
     its pressure on the soil does.
     """
@@ -125,7 +127,7 @@ def _forces_to_come(model: Any, end: float) -> NDArray[np.float64] | None:
     water, before = model._reservoirs, body.increment.x.array.copy()
     standing = water.forces(model.time) if model._standing is None else model._standing
     external = model._external_at(end) - water.forces(end) + standing
-    body.increment.x.array[:] = 0.0
+    body.increment.x.array[:] = _prescribed(model, end)
     forces = external - body.kinematics.internal_forces(model.points.stress).array
     body.increment.x.array[:] = before
     forces[model._supports.dofs] = 0.0
@@ -136,6 +138,20 @@ def _forces_to_come(model: Any, end: float) -> NDArray[np.float64] | None:
         return None
     of_cells = np.linalg.norm(here, axis=1)[compat.cell_dofs(space)[: owned_cells(domain)]]
     return np.asarray(of_cells.sum(axis=1))
+
+
+def _prescribed(model: Any, end: float) -> NDArray[np.float64]:
+    """The increment of a step that the heads on boundaries prescribe up to a time [s]: (m,); reservoirs press on the soil as well."""
+    fixed, heads, _ = model._applied.bounds(end)
+    of_heads = [held.dofs for held in model._applied.held if isinstance(held.condition, Head)]
+    dofs = np.concatenate([np.empty(0, dtype=np.int32), *of_heads])
+    dofs = np.setdiff1d(dofs[fixed[dofs]], model._waterless)
+    increment = np.zeros_like(model._body.increment.x.array)
+    change = model.water.unit_weight * heads[dofs] - model.pressure.x.array[dofs]
+    increment[model._pressures[1][dofs]] = (
+        np.where(np.abs(change) > model.water.unit_weight * MISSED, change, 0.0) / model._unit
+    )
+    return increment
 
 
 def _diffusivity(model: Any) -> NDArray[np.float64]:

@@ -88,6 +88,23 @@ def test_a_boundary_that_drains_elsewhere_than_under_the_load_counts():
     assert count == 1 and f"boundary {BASE}" in text
 
 
+@ELEMENTS
+@pytest.mark.parametrize("ratio", [0.95, 3.0])
+def test_a_head_that_falls_below_the_ground_settles_it_as_a_load_does(element, ratio):
+    """The strip of the ground that settles in the first step is as high as under a load: water is pumped from its base."""
+    settled = {}
+    for cells in (CELLS, 10 * CELLS):
+        column = Column(element, cells, boundary=[water.Head(BASE, lambda t: 1.0 if t == 0 else 0.0)], load=0.0)
+        dt = column.period / (CELLS * ratio) ** 2
+        count, text = warned(lambda: column.model.run(dt, dt))
+        settled[cells] = column.volume_lost()
+        if cells == CELLS:
+            assert count == (ratio > 1) and (f"boundary {BASE}" in text) == (ratio > 1)
+        else:
+            assert count == 0
+    assert (abs(settled[CELLS] / settled[10 * CELLS] - 1) > 0.2) == (ratio > 1)
+
+
 @pytest.mark.parametrize(
     "soil, count",
     [
