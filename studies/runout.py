@@ -131,20 +131,24 @@ def grounds(a: Namespace) -> tuple[terrain.Raster, terrain.Raster]:
 
 
 def body_between(a: Namespace, before: terrain.Raster, rupture: terrain.Raster) -> np.ndarray:
-    """Which points of the ground before the slide are more than 5 cm above the slip surface."""
+    """Which points of the ground before the slide are so far above the slip surface that particles fill the space.
+
+    Two surveys of the same ground differ a little, at the edge of the rasters by up to half of the distance of particles.
+    """
     x, y = np.meshgrid(before.x, before.y)
     thickness = before.values - rupture.at(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape)
-    body: np.ndarray = thickness > 0.05
+    body: np.ndarray = thickness > terrain.THINNEST * a.spacing
     if not body.any():
         raise mpm.InputError(
             "--terrain is nowhere higher than --rupture, expected a body between them" if a.terrain is not None else
             f"--thickness is {a.thickness:g} m with --height {a.height:g} m and --cell-size {a.cell_size:g} m, expected a slide "
-            "thicker than 0.05 m and longer than some cells: it is 0.7 --height long")  # fmt: skip
+            f"thicker than {terrain.THINNEST * a.spacing:.3g} m and longer than some cells: it is 0.7 --height long")  # fmt: skip
     inside = np.zeros_like(body)
     inside[1:-1, 1:-1] = True
-    if (body & ~inside).any():
+    at_edge = float(thickness[~inside].max())
+    if at_edge > 0.5 * a.spacing:
         raise mpm.InputError(
-            f"--terrain is up to {thickness[body & ~inside].max():.3g} m above --rupture at the edge of the rasters, expected the same "
+            f"--terrain is up to {at_edge:.3g} m above --rupture at the edge of the rasters, expected the same "
             "ground around the slide: elevations in metres from the same datum, and rasters larger than the slide")  # fmt: skip
     return body
 
@@ -292,7 +296,8 @@ def main(arguments: list[str] | None = None) -> int:
     said = (
         f"front {summary['front_m']:.1f} m from the initial centre of mass; the centre of mass fell {fall:.1f} m over "
         f"{travel:.1f} m; fastest {summary['fastest_m_per_s']:.1f} m/s; {summary['particle_steps_per_second'] / 1e6:.1f} million "
-        "particle-steps per second" + still_moving(history, a.density * volume) * (stopped is None)
+        "particle-steps per second"
+        + still_moving(history, a.density * volume - report.outflow_mass) * (stopped is None)
     )
     return write_summary(folder, a, summary, comm, pictures=pictures if a.pictures else {}, said=said)
 

@@ -55,6 +55,24 @@ def test_elevations_in_other_units_are_refused(tmp_path, elevations):
         built(importlib.import_module("runout").parse([*files, "--crs", "local"]))
 
 
+@pytest.mark.parametrize(("shift", "refused"), [(0.5, False), (1.0, True)])
+def test_surveys_that_differ_by_less_than_half_a_particle_at_the_edge_are_taken(shift, refused, tmp_path, elevations):
+    """As two surveys of the same ground do, by decimetres; particles are 1.33 m apart."""
+    plane, ground = elevations
+    ground[:3, :3] += shift
+    files = "--terrain", write(tmp_path / "a.asc", ground), "--rupture", write(tmp_path / "b.asc", plane)
+    runout = importlib.import_module("runout")
+    a = runout.parse([*files, "--crs", "local"])
+    if refused:
+        with pytest.raises(mpm.InputError, match=f"--terrain is up to {shift:g} m above --rupture at the edge"):
+            runout.body_between(a, *runout.grounds(a))
+    else:
+        body = runout.body_between(a, *runout.grounds(a))
+        # those of the cap of more than 0.133 m, and the corner
+        expected = ground - plane > 0.133
+        assert body.sum() == expected.sum()
+
+
 def test_a_slide_too_small_for_its_cells_names_their_options():
     with pytest.raises(
         mpm.InputError, match=r"--thickness is 8 m with --height 0.06 m and --cell-size 4 m, expected a slide"
