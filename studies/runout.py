@@ -32,6 +32,7 @@ from mpm_core.output import ModelOutput
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import terrain
+from fenics_bridge.terrain.slide import THINNEST
 
 comm = MPI.COMM_WORLD
 COLUMNS = ["time_s", "front_m", "centre_x_m", "centre_y_m", "centre_z_m", "fastest_m_per_s", "kinetic_energy_J",
@@ -137,12 +138,12 @@ def body_between(a: Namespace, before: terrain.Raster, rupture: terrain.Raster) 
     """
     x, y = np.meshgrid(before.x, before.y)
     thickness = before.values - rupture.at(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape)
-    body: np.ndarray = thickness > terrain.THINNEST * a.spacing
+    body: np.ndarray = thickness > THINNEST * a.spacing
     if not body.any():
         raise mpm.InputError(
             "--terrain is nowhere higher than --rupture, expected a body between them" if a.terrain is not None else
             f"--thickness is {a.thickness:g} m with --height {a.height:g} m and --cell-size {a.cell_size:g} m, expected a slide "
-            f"thicker than {terrain.THINNEST * a.spacing:.3g} m and longer than some cells: it is 0.7 --height long")  # fmt: skip
+            f"thicker than {THINNEST * a.spacing:.3g} m and longer than some cells: it is 0.7 --height long")  # fmt: skip
     inside = np.zeros_like(body)
     inside[1:-1, 1:-1] = True
     at_edge = float(thickness[~inside].max())

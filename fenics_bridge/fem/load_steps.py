@@ -189,7 +189,8 @@ def _warn_of_unmoved(model: Any, load: Load) -> None:
 def _not_reached(steps: list[LoadStep]) -> str:
     """Remainder of a load that was to be applied."""
     reached = max((step.value for step in steps if step.converged), default=0.0)
-    above = (step for step in steps if not step.converged and step.value > reached)  # others were passed by smaller steps
+    # Steps below it that failed were passed by smaller ones.
+    above = (step for step in steps if not step.converged and step.value > reached)
     failed = min(above, key=lambda step: step.value, default=None)
     reason = f": at {failed.value:.3%} {failed.report.reason}" if failed is not None else ""
     return (
