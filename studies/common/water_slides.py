@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 import warnings
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -78,9 +78,7 @@ def slide_of(
     unbalanced = model.out_of_balance(nmd=a.slide_water == "still" and averages(a, model.laws))
     with Interrupt(comm) as interrupt:
         result, stopped = slide(a, model, folder, interrupt, act, step)
-    time, displacement = result.history["time_s"], result.history["largest_displacement_m"]
-    moved = displacement[-1]
-    rests = moved - np.interp(0.5 * time[-1], time, displacement) <= COME_TO_REST * moved
+    moved = result.history["largest_displacement_m"][-1]
     if comm.rank == 0:
         print(f"slide from {time_in_words(instant.time)} on: largest displacement {metres(moved)} after "
               f"{result.history['time_s'][-1]:.3g} s")  # fmt: skip
@@ -88,7 +86,7 @@ def slide_of(
             print(f"the slide ended early: {stopped}", file=sys.stderr)
     summary = {
         "slide_from_days": instant.time / DAY, "slide_stopped_because": stopped, "largest_displacement_m": moved,
-        "slide_comes_to_rest": bool(rests),
+        "slide_comes_to_rest": stopped is None and comes_to_rest(result.history),
         "initial_out_of_balance_ratio": max(handover.unbalanced_ratio, unbalanced),
         "newly_yielded_fraction": handover.yielded_fraction,
         "particles": comm.allreduce(len(model.particles)),
@@ -96,6 +94,12 @@ def slide_of(
     movies = [particle_movie(f"slide after {time_in_words(instant.time)}", scene, result.frames)]
     code = interrupt.exit_code or (1 if stopped else 0)
     return summary, movies, slide_pictures(a, result, scene, folder), code
+
+
+def comes_to_rest(history: Mapping[str, np.ndarray]) -> bool:
+    """Whether the largest displacement hardly grows in the second half of a slide."""
+    time, displacement = history["time_s"], history["largest_displacement_m"]
+    return bool(displacement[-1] - np.interp(0.5 * time[-1], time, displacement) <= COME_TO_REST * displacement[-1])
 
 
 def let_water_flow(slope: SlopeSite, instant: Instant, model: mpm.Model) -> None:

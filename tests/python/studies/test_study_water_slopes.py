@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
+from study_main import main
 
 from mpm_core import InputError
 
@@ -109,6 +110,21 @@ def test_a_slope_that_fails_with_the_strength_of_davis_only_says_why_its_particl
     assert 0.9 < summary["last_factor_of_safety"] < 1 and summary["slide_comes_to_rest"]
     words = "although the factor of safety is below 1: they have the flow rule of the soil, with which it is stronger"
     assert words in capsys.readouterr().out
+
+
+def test_a_slide_that_ends_early_does_not_come_to_rest(tmp_path, capsys, monkeypatch):
+    from common import water_slides
+
+    whole = water_slides.slide
+    monkeypatch.setattr(water_slides, "slide", lambda *given: (whole(*given)[0], "interrupted at 1 s"))
+    options = "--elements P2 --cell-size 1.6 --days 1.6 --slide --time 2 --frames 4 --no-pictures --no-film"
+    folder = tmp_path / "results"
+    assert (
+        main("drawdown", ["--site", site("drawdown", tmp_path), "--output", folder, *SMALL.split(), *options.split()])
+        == 1
+    )
+    assert json.loads((folder / "summary.json").read_text())["slide_comes_to_rest"] is False
+    assert "the particles rest again" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("change, said", [({}, True), ({"moved": 1.0}, False), ({"rests": False}, False), ({"davis": False}, False),
