@@ -125,7 +125,8 @@ def test_ctrl_c_reaches_all_ranks(begun):
     assert summary["ranks"] == 2 and summary["stopped_because"].startswith("interrupted at")
     checkpoint = begun / "results" / "mine" / "checkpoint.h5"
     assert f"--restart {checkpoint} continues from there" in summary["stopped_because"]
-    reached = float(rows.read_text().split()[-1].split(",")[0])
+    before = rows.read_text()
+    reached = float(before.split()[-1].split(",")[0])
     refused = talus(begun, "run", "mine", "--restart", checkpoint, "--factor", "2")
     assert refused.returncode == 2 and "A restart may change: checkpoint-every, frames, time" in refused.stderr
     done = talus(begun, "run", "mine", "--restart", checkpoint, "--time", reached + 0.01, "--frames", "10")
@@ -133,8 +134,9 @@ def test_ctrl_c_reaches_all_ranks(begun):
     again = json.loads((begun / "results" / "mine" / "summary.json").read_text())
     assert again["finished_run"] and again["restarts"][0]["time_s"] == pytest.approx(reached)
     assert again["initial_out_of_balance_ratio"] == summary["initial_out_of_balance_ratio"]
+    assert rows.read_text().startswith(before)  # with the row of the moment of the interruption
     times = [float(line.split(",")[0]) for line in rows.read_text().split()[1:]]
-    assert times == sorted(set(times)) and times[-1] == pytest.approx(reached + 0.01)
+    assert times[0] == 0 and times == sorted(set(times)) and times[-1] == pytest.approx(reached + 0.01)
 
 
 def test_info_names_versions_and_solvers(tmp_path):
