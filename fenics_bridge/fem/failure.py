@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from fenics_bridge.fem.active_cells import free_motions
-from fenics_bridge.mesh.names import label
+from fenics_bridge.mesh.names import group_label
 
 
 def explained(fem: Any, reason: str, load: Any) -> str:
     """The reason why a QuasiStatic found no equilibrium under a load, with load, place, soil, law and advice. Collective."""
     where, soil, law, tension = most_moved(fem)
     place = ", ".join(f"{round(float(x), 6):.3g}" for x in where)  # without what round-off leaves of zero
-    name = "" if soil is None else f"the soil {label(fem.cell_tags, soil)} "
+    name = "" if soil is None else f"the soil {group_label(fem.cell_tags, soil)} "
     return (
         f"{reason}; under {_in_words(fem, load)}; most moved {name}near ({place}) m, which follows the law {law.name}. "
         f"{advice(reason, free_motions(fem), law, tension)}"
@@ -118,7 +118,7 @@ def _in_words(fem: Any, load: Any) -> str:
     parts += [f"traction {_vector(t)} Pa{_of(fem.facet_tags, tag)}" for tag, t in load.traction.items()]
     parts += [f"{load.displacement:.3g} of the prescribed displacements"] if load.displacement else []
     parts += [f"{load.held:.3g} of the forces still held"] if load.held else []
-    return ", ".join(parts) or "no load"
+    return ", ".join(dict.fromkeys(parts)) or "no load"  # once for all classes of a soil
 
 
 def _vector(components: Any) -> str:
@@ -126,4 +126,4 @@ def _vector(components: Any) -> str:
 
 
 def _of(tags: Any, tag: Any) -> Any:
-    return "" if tag is None else f" of {tag!r}" if isinstance(tag, str) else f" of {label(tags, tag)}"
+    return "" if tag is None else f" of {group_label(tags, tag)}"

@@ -19,7 +19,7 @@ from fenics_bridge import compat
 from fenics_bridge.errors import agree, real_numbers
 from fenics_bridge.fem.fields import assembled
 from fenics_bridge.fem.geometry import weighted
-from fenics_bridge.mesh.names import by_number, label, tag_numbers
+from fenics_bridge.mesh.names import by_number, group_label, label, tag_numbers
 from fenics_bridge.mesh.tagged import numbered_anew
 from fenics_bridge.types import MeshTags
 from mpm_core import checks
@@ -110,10 +110,10 @@ def _arrays(name: str, vectors: Any) -> Any:
     return {tag: checks.real_numbers(name, vector) for tag, vector in vectors.items()}
 
 
-def warn_of_weight(comm: MPI.Comm, load: Load) -> None:
+def warn_of_weight(comm: MPI.Comm, load: Load, cell_tags: MeshTags | None = None) -> None:
     """Warn of a unit weight that no soil has, such as one in kN/m3 or one that acts upwards; none is fine."""
     weights = [
-        (float(weight), f" of {tag!r}" if isinstance(tag, str) else "")
+        (float(weight), "" if tag is None else f" of {group_label(cell_tags, tag)}")
         for tag, weight in weight_by_tag(load.unit_weight).items()
     ]
     odd = [(weight, of) for weight, of in weights if weight and not is_unit_weight(abs(weight))]

@@ -323,7 +323,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
             InputError: an unknown tag, or a load that is not finite. Raised on all ranks alike.
         """
         load = self._loads.resolved(load)
-        warn_of_weight(self.domain.comm, load)
+        warn_of_weight(self.domain.comm, load, self.cell_tags)
         steps = raise_load(self, load, first_step, tolerance, progress)
         warn_of_motion(self)
         return steps

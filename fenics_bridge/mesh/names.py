@@ -44,6 +44,12 @@ def label(tags: Any, number: int | None) -> str:
     return next((repr(name) for name, numbers in names_of(tags).items() if numbers == (number,)), str(number))
 
 
+def group_label(tags: Any, tag: Tag) -> str:
+    """A tag as messages show it: its name, else that of the smallest group that it is in, as a class of a soil is, else the number."""
+    groups = [(len(numbers), name) for name, numbers in names_of(tags).items() if tag in numbers]
+    return repr(min(groups)[1] if groups else tag)
+
+
 def known_tags(comm: MPI.Comm, tags: Any) -> list[int]:
     """All tags that entities have on any rank, in order. Collective."""
     every = comm.allgather(set(np.unique(tags.values).tolist()) if tags is not None else set())

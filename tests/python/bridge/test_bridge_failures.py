@@ -75,3 +75,17 @@ def mesh_tags():
     cells = BODY.topology.index_map(2)
     every = np.arange(cells.size_local + cells.num_ghosts, dtype=np.int32)
     return mesh.meshtags(BODY, 2, every, np.ones_like(every))
+
+
+def test_the_classes_of_a_soil_have_its_name_in_messages():
+    domain, cell_tags, facet_tags = bridge.slope_mesh(MPI.COMM_WORLD, crest=1.0, cell_size=0.25)
+    body, tags, facets = bridge.soil_mesh(domain, cell_tags, facet_tags)
+    tags, heights = bridge.graded_tags(body, bridge.name_tags(tags, {"clay": bridge.SOIL}), "clay", lambda x: x[:, 1])
+    laws = {tag: soil(cohesion=1e3 + 100 * height) for tag, height in heights.items()}
+    fem = bridge.QuasiStatic(body, laws, facets, HELD, cell_tags=tags)
+    with pytest.warns(RuntimeWarning) as warned:
+        fem.solve(bridge.Load(unit_weight={"clay": 200e3}), tolerance=0.02)
+    texts = [str(one.message) for one in warned]
+    assert any(text.startswith("the unit weight of 'clay' is 2e+05 N/m3") for text in texts)
+    reason = next(text for text in texts if "the load was not reached" in text)
+    assert re.search(r"under unit weight \S+ N/m3 of 'clay'; most moved the soil 'clay' near", reason), reason
