@@ -268,3 +268,52 @@ def test_rows_of_ground_that_stiffens_with_depth_are_averaged_together():
         fem = site.finite_elements(degree=degree, nmd=degree == 1)
         found[degree] = bridge.factor_of_safety(fem, site.load(), start=1.0, tolerance=5e-3).value
     assert found[1] == pytest.approx(found[2], rel=0.04)
+
+
+ELASTIC = """
+mesh = "block.geo"
+cell_size = 0.5
+[soils.lower]
+unit_weight = 18e3
+material = "elastic"
+young = 5e6
+poisson = 0.2
+[soils.upper]
+unit_weight = 18e3
+material = "elastic"
+young = 5e6
+poisson = 0.2
+[laws.stiff]
+material = "elastic"
+young = 5e9
+poisson = 0.4
+[supports]
+base = "fixed"
+[[stages]]
+fill = ["lower", "upper"]
+law = {lower = "stiff"}
+support = {left = "roller"}
+[[stages]]
+excavate = "upper"
+"""
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_an_excavation_is_compared_with_the_laws_and_supports_that_stages_bring(tmp_path):
+    """Elastic soil that has its last laws and supports from the first stage on has the same stresses at once."""
+    options = ["--site", site_in(tmp_path, ELASTIC), "--output", tmp_path / "out"]
+    assert importlib.import_module("excavation").main([str(word) for word in options]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["difference_to_at_once"] < 1e-8
+    assert "difference_to_at_once_elastic" not in summary  # in general elastic soil, too, depends on when they come
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_layers_placed_later_are_not_compared_in_elastic_soil(tmp_path):
+    """A layer is free of stress on soil that has settled, and so elastic soil, too, has other stresses than at once."""
+    stages = '[[stages]]\nfill = ["lower"]\n[[stages]]\nfill = ["upper"]\n'
+    text = ELASTIC[: ELASTIC.index("[[stages]]")] + stages
+    options = ["--site", site_in(tmp_path, text), "--output", tmp_path / "out"]
+    assert importlib.import_module("excavation").main([str(word) for word in options]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["difference_to_at_once"] > 1e-3 and "difference_to_at_once_elastic" not in summary
