@@ -70,8 +70,8 @@ def checked_values(source: str, table: Mapping[str, Any], actions: Sequence[argp
     """
     known = _named(actions)
     values: dict[str, object] = {}
-    for key, value in table.items():
-        key = present_name(key.replace("_", "-"), actions)
+    for name, value in table.items():
+        key = present_name(name.replace("_", "-"), actions)
         if key not in known:
             raise ParameterError(f"{source}: {unknown_key(key, known)}")
         if known[key].dest in values:
@@ -79,7 +79,7 @@ def checked_values(source: str, table: Mapping[str, Any], actions: Sequence[argp
         try:
             values[known[key].dest] = None if value is None else _from_toml(known[key], value)
         except (argparse.ArgumentTypeError, ValueError) as error:
-            raise ParameterError(f"{source}: {key} {error}") from None
+            raise ParameterError(f"{source}: {name} {error}") from None
     return values
 
 

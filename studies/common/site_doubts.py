@@ -15,6 +15,9 @@ from .checks import say
 DEEPEST = 3.0
 """Depth of water over the top of a mesh, over the height of the mesh, above which a level is probably a mistake"""
 
+LOOSEST = 1e-5
+"""Compressibility [1/Pa] above which it is probably in other units, or a modulus"""
+
 
 def ends_of_height(domain: Any) -> tuple[float, float]:
     """Height of the lowest and of the highest point of a mesh [m]. Collective."""
@@ -41,6 +44,9 @@ def warn_of_reservoirs(domain: Any, boundary: Iterable[Any], path: Any) -> None:
 
 
 def warn_of_flow(soil: water.PorousSoil, where: str) -> None:
-    """Warn of a conductivity that is probably in other units; where: the soil stands in the file."""
+    """Warn of a conductivity or compressibility that is probably in other units; where: the soil stands in the file."""
     largest = np.linalg.eigvalsh(soil.tensor(soil.conductivity, 2)).max()
     say(fast_flow(f"{where}: conductivity", float(largest)))
+    if soil.compressibility > LOOSEST:
+        say(f"{where}: compressibility is {soil.compressibility:g} 1/Pa, of an oedometric modulus of {1 / soil.compressibility:.3g} Pa, which "
+            "hardly any soil has: compressibilities are in 1/Pa, such as 1e-7 for a modulus of 10 MPa")  # fmt: skip

@@ -201,7 +201,7 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
         where = f"{path}: soils.{soil}"
         weights[soil] = unit_weight_of(given, where)
         parameters = located(part_of(given, law_keys()), path)
-        say(unit_doubt(parameters, where))
+        heights: dict[int, float] = {}
         if not set(parameters) - {"porosity"}:
             raise mpm.InputError(f"{where} has no law, which this study needs: material, and the parameters of the law")
         if any(isinstance(value, dict) for value in parameters.values()):
@@ -212,6 +212,7 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
         else:
             law = law_at(parameters, None, where)
             laws |= dict.fromkeys(bridge.names_of(cell_tags).get(soil, (soil,)), law)
+        say(unit_doubt(parameters, where, heights.values()))
     others = {
         name: law_at(located(given, path), None, f"{path}: laws.{name}")
         for name, given in table.get("laws", {}).items()

@@ -12,7 +12,7 @@ import mpm_core as mpm
 from fenics_bridge import water
 
 from .parameters import unknown_key
-from .site_laws import law_keys
+from .site_laws import is_number, law_keys
 
 DAY = 86400.0
 MM_PER_DAY = 1e-3 / DAY
@@ -74,6 +74,9 @@ def read_site_table(path: Path, needed: Sequence[str] = ()) -> dict[str, Any]:
     for key in ("mesh", "soils", *needed):
         if key not in table:
             raise mpm.InputError(f"{path} has no {key!r}, which this study needs: {KEYS[key]}")
+    size = table.get("cell_size", 1.0)
+    if not (is_number(size) and size > 0):
+        raise mpm.InputError(f"{path}: cell_size is {size!r}, expected a number above 0 [m]")
     for key, known in (("soils", (*FLOW, "unit_weight", *law_keys())), ("laws", law_keys()), ("boundaries", WATER)):
         for name, given in _table_at(table, key, str(path)).items():
             _require_known(given, known, f"{path}: {key}.{name}")

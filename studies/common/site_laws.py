@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -54,11 +54,12 @@ def law_at(table: dict, height: float | None, where: str) -> Any:
         where: the table stands, for messages.
     """
     values = vars(_parser().parse_args([]))
+    place = "" if height is None else f", at a height of {height:.4g} m"
     try:
-        here = {key.replace("_", "-"): _at_height(key, value, height) for key, value in table.items()}
+        here = {key: _at_height(key, value, height) for key, value in table.items()}
         values |= checked_values(where, here, _parser()._actions)
     except (ParameterError, ValueError) as error:
-        raise mpm.InputError(str(error) if isinstance(error, ParameterError) else f"{where}: {error}") from None
+        raise mpm.InputError(f"{error}{place}" if isinstance(error, ParameterError) else f"{where}: {error}") from None
     if values["shear_strength"] is not None:
         values["cohesion"] = values["shear_strength"]
     return law_of(argparse.Namespace(**values))
@@ -87,13 +88,20 @@ LEAST = {"young": 1e5, "cohesion": 50.0, "shear_strength": 50.0}
 """Parameters [Pa] below which a soil of a site is probably given in kPa or MPa"""
 
 
-def unit_doubt(parameters: Mapping[str, Any], where: str) -> str:
-    """A warning of stiffness, of soil or water, or strength in another unit than Pa; empty where there is no doubt, as for films that keep their volume."""
+def unit_doubt(parameters: Mapping[str, Any], where: str, heights: Collection[float] = ()) -> str:
+    """A warning of stiffness, of soil or water, or strength in another unit than Pa; empty where there is no doubt, as for films that keep their volume.
+
+    Args:
+        parameters: of a law; where: they stand in the file.
+        heights: of the soil [m], where a parameter grows with depth; its largest value counts.
+    """
     for name, least in LEAST.items():
-        value = parameters.get(name)
+        value, most = parameters.get(name), ""
+        if isinstance(value, dict):
+            value, most = max(_at_height(name, value, height) for height in heights), " at most"
         fluid = name == "young" and is_number(parameters.get("poisson")) and parameters["poisson"] > 0.49
         if is_number(value) and 0 < value < least and not fluid:
-            return f"{where}: {name} is {value:g} Pa, which hardly any soil has: stresses and moduli are in Pa, such as 10e3 for 10 kPa"
+            return f"{where}: {name} is {value:g} Pa{most}, which hardly any soil has: stresses and moduli are in Pa, such as 10e3 for 10 kPa"
     modulus = parameters.get("water_modulus")
     return soft_water(f"{where}: water_modulus", modulus) if is_number(modulus) and modulus > 0 else ""
 

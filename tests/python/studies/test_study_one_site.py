@@ -168,6 +168,10 @@ def test_a_soil_that_no_stage_fills_is_named(tmp_path):
     [
         (("cohesion = 10e3  # Pa", "cohesion = 10.0"), "soils.bank: cohesion is 10 Pa, which hardly any soil has"),
         (("young = 20e6  # Pa", "young = 20e3"), "soils.bank: young is 20000 Pa, which hardly any soil has"),
+        (
+            ("cohesion = 10e3  # Pa", "cohesion = {value = 10.0, per_metre = 2.0, top = 8.0}"),
+            r"soils.bank: cohesion is 2\d\.\d+ Pa at most, which hardly any soil has",
+        ),
     ],
 )
 def test_stiffness_and_strength_in_kilopascals_are_named(change, words, tmp_path):
@@ -175,6 +179,26 @@ def test_stiffness_and_strength_in_kilopascals_are_named(change, words, tmp_path
 
     with pytest.warns(RuntimeWarning, match=words):
         read_site(written(tmp_path, change), MPI.COMM_WORLD, 3.0)
+
+
+def test_a_strength_that_is_small_at_the_top_only_is_not_named(tmp_path):
+    from common.site_file import read_site
+
+    change = "cohesion = 10e3  # Pa", "cohesion = {value = 0.0, per_metre = 2e3, top = 8.0}"
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", message=".*which hardly any soil has")
+        read_site(written(tmp_path, change), MPI.COMM_WORLD, 3.0)
+
+
+@pytest.mark.parametrize("given, words", [(2e7, 1), (5e-5, 1), (5e-8, 0)])
+def test_a_modulus_or_kilopascals_in_the_place_of_a_compressibility_are_named(given, words, tmp_path):
+    from common.water_site import read_water_site
+
+    change = "compressibility = 5e-8", f"compressibility = {given}"
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        read_water_site(written(tmp_path, change), MPI.COMM_WORLD, 3.0)
+    assert sum("soils.bank: compressibility is " in str(one.message) for one in said) == words
 
 
 @pytest.mark.parametrize("modulus, words", [(2.2, 1), (2.2e9, 0)])
