@@ -273,6 +273,8 @@ def main(arguments: list[str] | None = None) -> int:
     pictures = {"stress_path": lambda: draw(history, a, folder / "stress_path.png")}
     largest = history["q_Pa"].max()
     said = f"{a.test}: p' {end['p_Pa'] / 1e3:.4g} kPa, q {end['q_Pa'] / 1e3:.4g} kPa, largest q {largest / 1e3:.4g} kPa"
+    if "shear" in a.test:
+        said += f", largest shear stress {np.abs(history['shear_stress_Pa']).max() / 1e3:.4g} kPa"
     return write_summary(folder, a, summary, pictures=pictures, said=said)
 
 

@@ -21,6 +21,11 @@ def test_drained_triaxial_test_ends_at_the_strength(tmp_path):
     assert all((tmp_path / name).stat().st_size > 0 for name in ("stress_path.png", "history.csv"))
 
 
+def test_the_shear_strength_of_clay_is_said_after_simple_shear(tmp_path):
+    result = ended("element_test", tmp_path, *"--test shear --material tresca --cohesion 20e3 --young 20e6".split())
+    assert result.returncode == 0 and "largest shear stress 20 kPa" in result.stdout
+
+
 @pytest.mark.parametrize(
     "options, said",
     [
