@@ -32,6 +32,14 @@ class Raster:
     crs: str = "local"
     """Coordinate reference, for instance "EPSG:25832", or "local" for metres on a plane"""
 
+    def __repr__(self) -> str:
+        known = self.values[np.isfinite(self.values)]
+        values = f"{known.min():.6g} to {known.max():.6g}" if len(known) else "none"
+        return (
+            f"<Raster: {len(self.x)} by {len(self.y)} points {self.spacing:g} m apart, x {self.x[0]:.10g} to {self.x[-1]:.10g} m, "
+            f"y {self.y[0]:.10g} to {self.y[-1]:.10g} m, values {values}, {self.crs}>"
+        )
+
     @property
     def spacing(self) -> float:
         """Distance between neighbouring points [m]."""
@@ -102,8 +110,8 @@ class Raster:
         )
         if not (low[0] < high[0] and low[1] < high[1] and inside):
             raise InputError(f"window is {tuple(low)} to {tuple(high)} m, expected corners inside of x "
-                             f"{self.x[0]:g} to {self.x[-1]:g} m "
-                             f"and y {self.y[0]:g} to {self.y[-1]:g} m")  # fmt: skip
+                             f"{self.x[0]:.10g} to {self.x[-1]:.10g} m "
+                             f"and y {self.y[0]:.10g} to {self.y[-1]:.10g} m")  # fmt: skip
         return Raster(self.x[columns], self.y[rows], self.values[np.ix_(rows, columns)], self.crs)
 
     def triangles(self) -> mpm.Triangles:
@@ -243,7 +251,7 @@ def _check_heights(raster: Any, name: str) -> None:
     gaps = np.argwhere(~np.isfinite(raster.values))
     if len(gaps):
         at = raster.x[gaps[0][1]], raster.y[gaps[0][0]]
-        raise InputError(f"path: {name!r} has {len(gaps)} gap{'s' * (len(gaps) > 1)}, the first one at x = {at[0]:g} m, y = {at[1]:g} m; fill them, "
+        raise InputError(f"path: {name!r} has {len(gaps)} gap{'s' * (len(gaps) > 1)}, the first one at x = {at[0]:.10g} m, y = {at[1]:.10g} m; fill them, "
                          "for instance by gdal_fillnodata, or take a window without any")  # fmt: skip
     steep = np.abs(np.diff(raster.values, axis=1)).mean() / raster.spacing
     small = max(np.abs(raster.x).max(), np.abs(raster.y).max()) <= 360

@@ -51,7 +51,7 @@ def test_gaps_are_refused_where_they_matter(tmp_path):
     ground = hill()
     ground.values[1, 0] = np.nan
     terrain.write_raster(tmp_path / "ground.tif", ground)
-    with pytest.raises(bridge.InputError, match="has 1 gap, the first one at x = 500000 m, y = 5.4e"):
+    with pytest.raises(bridge.InputError, match="has 1 gap, the first one at x = 500000 m, y = 5400002 m"):
         terrain.read_raster(tmp_path / "ground.tif")
     terrain.read_raster(tmp_path / "ground.tif", window=((500_004.0, 5_400_004.0), (500_010.0, 5_400_008.0)))
 

@@ -225,3 +225,14 @@ def test_rasters_that_do_not_fit_are_named():
         slide_model(other, rupture)
     with pytest.raises(bridge.InputError, match="nowhere higher than rupture"):
         slide_model(rupture, rupture)
+
+
+def test_places_with_coordinates_of_a_country_are_named_to_the_metre():
+    """Northings have seven digits, such as those of EPSG:25832."""
+    x, y = 512001.0 + 2 * np.arange(4), 5403001.0 + 2 * np.arange(3)
+    ground = terrain.Raster(x, y, np.add.outer(0.5 * np.arange(3), np.arange(4.0)), crs="EPSG:25832")
+    assert repr(ground) == (
+        "<Raster: 4 by 3 points 2 m apart, x 512001 to 512007 m, y 5403001 to 5403005 m, values 0 to 4, EPSG:25832>"
+    )
+    with pytest.raises(mpm.InputError, match="x 512001 to 512007 m and y 5403001 to 5403005 m"):
+        ground.window((511000.0, 5403001.0), (512005.0, 5403005.0))
