@@ -26,7 +26,8 @@ class Solver:
     relaxation: bool = True
     """Whether `relaxation.relax` takes over where Newton's method does not converge"""
     relaxed_tolerance: float = 1e-5
-    """Out-of-balance force at which a relaxation ends [-]"""
+    """Out-of-balance force at which a relaxation ends [-]; where a cell that yields lacks more than 1 % of its strength then, a tenth
+    of it, down to a thousandth"""
     missing_tolerance: float = 0.0
     """A relaxation also ends when the out-of-balance force, and in every cell that yields the missing stress over the mobilised
     strength, are below this number [-]; at 0 only `relaxed_tolerance` counts"""
@@ -44,7 +45,7 @@ class Solver:
                 raise InputError(f"{name} is {getattr(self, name)!r}, expected a whole number above 0")
 
 
-PRACTICE = Solver(tolerance=1e-5, missing_tolerance=1e-2)
+PRACTICE = Solver(tolerance=1e-7, missing_tolerance=1e-2)
 """Also accepts a relaxation with an out-of-balance force of 1 % in which no cell that yields lacks more than 1 % of the stress,
 tolerances as in practice. Factors of safety become up to 1 % higher, whatever part of the body fails: see `missing_stress`."""
 
