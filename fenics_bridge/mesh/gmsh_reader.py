@@ -121,7 +121,9 @@ def model_arrays(dim: int) -> dict[str, Any]:
     if not np.isin(cells, tags).all():
         raise MeshError("has cells with nodes that are not there")
     if dim == 2 and np.ptp(points[np.isin(tags, cells), 2]) > 1e-9 * np.ptp(points):
-        raise MeshError("its nodes have different z, expected triangles in the plane z = 0; tetrahedra are read with dim=3")
+        raise MeshError(
+            "its nodes have different z, expected triangles in the plane z = 0; tetrahedra are read with dim=3"
+        )
     order = np.argsort(tags)
     used = np.unique(cells)
     rows = order[np.searchsorted(tags, used, sorter=order)]
