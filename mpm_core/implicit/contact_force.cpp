@@ -25,13 +25,11 @@ Vector<D> slip_of(const std::vector<Column>* slips, Index p)
 /// The particles of a run that touch a surface when the nodes move with a velocity over a time.
 template <class G, int D = G::dim>
 void find_touching(const Model<G>& model, SeenSurface<D> seen, const std::vector<Column>* slips, const Run& run,
-                   const std::vector<Column>* bonds, std::span<const Vector<D>> velocity, double dt, double volumetric,
-                   bool tangents, TrialContact<D>& trial)
+                   const ContactModuli& moduli, const std::vector<Column>* bonds, std::span<const Vector<D>> velocity,
+                   double dt, double volumetric, bool tangents, TrialContact<D>& trial)
 {
   const auto nodal = [velocity](Index i) -> const Vector<D>& { return velocity[static_cast<std::size_t>(i)]; };
   const AffineField<D> field = affine_field<D>(model.mesh, run.cell, nodal);
-  const WaveModuli of_soil = mean_moduli(material_points(model), run);
-  const ContactModuli moduli{of_soil.p_wave, of_soil.shear};
   for (Index p = run.first; p < run.last; ++p)
   {
     if (bonds && !is_tied(*bonds, p))
@@ -207,8 +205,8 @@ void find_contacts(Model<G>& model, bool tangents, ImplicitStep<G>& step)
       if (!may_be_near<D>(extremes, gap))
         continue;
       const SeenSurface<D> seen = seen_from(contact, static_cast<Index>(run.cell), travelled + extremes.motion);
-      find_touching<G, D>(model, seen, slips, run, tied, velocity, time.dt, step.strains[cell].volumetric,
-                          tangents && !wet, trial);
+      find_touching<G, D>(model, seen, slips, run, found.moduli[cell], tied, velocity, time.dt,
+                          step.strains[cell].volumetric, tangents && !wet, trial);
     }
     if (wet)
       share_with_water(model, step, travelled, tangents, contact, trial);
@@ -216,6 +214,15 @@ void find_contacts(Model<G>& model, bool tangents, ImplicitStep<G>& step)
   }
 }
 } // namespace
+
+template <class G>
+void start_contacts(const Model<G>& model, ImplicitStep<G>& step)
+{
+  step.contact.moduli.clear();
+  if (!model.contacts.empty())
+    for (const WaveModuli& of_cell : moduli_of_cells(material_points(model), model.mesh.owned_cells))
+      step.contact.moduli.push_back({of_cell.p_wave, of_cell.shear});
+}
 
 template <class G>
 void try_contacts(Model<G>& model, bool tangents, ImplicitStep<G>& step)
@@ -336,6 +343,7 @@ void add_contact_tractions(Model<G>& model, const ImplicitStep<G>& step)
 }
 
 #define INSTANTIATE(G)                                                                                                 \
+  template void start_contacts(const Model<G>&, ImplicitStep<G>&);                                                     \
   template void try_contacts(Model<G>&, bool, ImplicitStep<G>&);                                                       \
   template void add_contact_forces(const ImplicitStep<G>&, std::vector<NodalForces<G::dim>>&);                         \
   template void add_contact_entries(const Mesh<G::dim>&, const ImplicitStep<G>&, TangentSum<G::dim>&);                 \

@@ -6,6 +6,10 @@
 
 namespace mpm::implicit
 {
+/// The moduli of the soil by which contact is stiff in a step.
+template <class G>
+void start_contacts(const Model<G>& model, ImplicitStep<G>& step);
+
 /// The particles that touch in the trial, their forces at nodes, and their blocks of the tangent where it is wanted.
 /// @pre `field.velocity` is the iterate, also at nodes of other ranks
 template <class G>

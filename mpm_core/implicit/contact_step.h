@@ -76,6 +76,7 @@ std::array<double, D + 1> weights_at(const CellShape<D>& shape, const Vector<D>&
 template <int D>
 struct ContactStep
 {
+  std::vector<ContactModuli> moduli;     ///< means of the soil in each owned cell at the step's start
   std::vector<TrialContact<D>> surfaces; ///< as many as the model has
   std::vector<Vector<D>> forces;         ///< at nodes, this rank's part [N]
   std::vector<CellContact<D>> cells;     ///< those with touching particles [N/m]

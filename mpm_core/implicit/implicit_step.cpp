@@ -80,6 +80,7 @@ void start_step(Model<G>& model, ImplicitStep<G>& step, const ImplicitOptions& o
   field.velocity = field.start_velocity;
   impose_supports(step, field);
   begin_first_stage(field, step);
+  start_contacts(model, step);
   start_bodies(model, step);
   start_pore_water(model, step);
   step.forces.assign(field.nodes.size(), {});

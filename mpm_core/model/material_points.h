@@ -77,4 +77,27 @@ WaveModuli mean_moduli(const MaterialPoints<D>& points, const Run& run)
   }
   return {p_wave / volume, shear / volume};
 }
+
+/// Means of the moduli of the points in each of the first cells, by their volumes [Pa]; zero in empty cells. Particles
+/// that came into a cell may be a run of their own there, until they are sorted.
+template <int D>
+std::vector<WaveModuli> moduli_of_cells(const MaterialPoints<D>& points, Index cells)
+{
+  std::vector<WaveModuli> sums(static_cast<std::size_t>(cells), WaveModuli{0, 0});
+  std::vector<double> volumes(sums.size(), 0.0);
+  for (const Run& run : points.runs)
+  {
+    double volume = 0;
+    for (Index p = run.first; p < run.last; ++p)
+      volume += points.particles.volume[p];
+    const WaveModuli mean = mean_moduli(points, run);
+    volumes[run.cell] += volume;
+    sums[run.cell].p_wave += volume * mean.p_wave;
+    sums[run.cell].shear += volume * mean.shear;
+  }
+  for (std::size_t c = 0; c < sums.size(); ++c)
+    if (volumes[c] > 0)
+      sums[c] = {sums[c].p_wave / volumes[c], sums[c].shear / volumes[c]};
+  return sums;
+}
 } // namespace mpm::model
