@@ -16,11 +16,13 @@ namespace mpm::explicit_scheme
 {
 namespace
 {
+/// Six digits, or nine of coordinates of a map, whose metres count.
 template <std::size_t N>
 std::string show(const std::array<double, N>& values)
 {
+  const bool far = std::ranges::any_of(values, [](double value) { return std::abs(value) >= 1e4; });
   std::ostringstream out;
-  out.precision(6);
+  out.precision(far ? 9 : 6);
   for (std::size_t i = 0; i < N; ++i)
     out << (i ? ", " : "(") << values[i];
   return out.str() + ")";

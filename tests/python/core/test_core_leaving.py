@@ -59,6 +59,16 @@ def test_a_particle_that_leaves_elsewhere_stops_the_run_and_is_named(dim):
     assert len(model.particles) == len(x)  # nobody was dropped
 
 
+def test_the_place_of_a_particle_on_a_map_is_given_to_the_centimetre():
+    there = np.array([351234.0, 5403030.0])
+    squares = box((2, 2), (1.0, 1.0))
+    model = mpm.Model(mpm.Mesh(squares.points + there, squares.cells), mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed_points([there + 0.53], [0.01], density=2000.0)
+    model.particles.set("velocity", [(0.0, 1.0)])
+    with pytest.raises(mpm.RunError, match=r"at \(351234\.53, 5403031\.0\d?\) m"):
+        model.explicit(1.0, dt=0.01).last()
+
+
 @pytest.mark.parametrize("dim", DIMS)
 def test_values_that_are_not_numbers_cannot_be_set(dim):
     model = moving_block(dim)
