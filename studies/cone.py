@@ -20,7 +20,7 @@ import numpy as np
 from common.body_runs import MAY_CHANGE, BodyRun, add_body_run_options, body_pictures, follow, mean_force, write_results
 from common.checkpoint import check_restart
 from common.checks import check_cells
-from common.cone_theory import lu, spherical_limit_pressure, teh_houlsby
+from common.cone_theory import STEEPNESS, lu, spherical_limit_pressure, teh_houlsby
 from common.figures import Pictures, curve_figure
 from common.history import History
 from common.movie import particle_movie
@@ -38,8 +38,6 @@ import mpm_core as mpm
 comm = MPI.COMM_WORLD
 COLUMNS = ["time_s", "depth_m", "cone_factor", "resistance_Pa", "impulse_Ns", "shaft_impulse_Ns", "contact_area_m2",
            "sticking_fraction", "unexplained_fraction_of_energy", "dt_s"]  # fmt: skip
-STEEPNESS = np.sqrt(3.0)
-"""Height of the cone over its radius: 60 degrees at its tip"""
 STEADY = 0.15
 """Last part of the way over which the factor is averaged"""
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -26,18 +27,24 @@ from .movie import gathered, own_frame
 from .options import Options, add_choice, add_count, add_number, add_switch
 from .output_options import add_output_options, add_picture_options, check_frames
 from .page import Page
-from .plots import DISPLACEMENT, SHEAR_STRAIN, Scene, save_particles
+from .plots import DISPLACEMENT, SHEAR_STRAIN, WATER_PRESSURE, Quantity, Scene, save_particles
 from .progress import Progress
 from .schemes import INTEGRATIONS, add_particles_per_cell, add_pic
 from .summary import write_summary
 
-MAY_CHANGE = {
-    "damping", "pic", "integration", "frames", "checkpoint-every", "fields", "float64", "compression", "pictures", "film",
-    "rebalance",
-}  # fmt: skip
+FILES_MAY_CHANGE = {"frames", "checkpoint-every", "fields", "float64", "compression", "pictures", "film"}
+"""Those among them that say what is written"""
+MAY_CHANGE = FILES_MAY_CHANGE | {"damping", "pic", "integration", "rebalance"}
 """Options with which a run may go on from a checkpoint in another way: how it steps and what it writes"""
-CAPTIONS = {"strain": "Accumulated plastic shear strain in the end", "displacement": "Displacement in the end"}
-"""Captions of the pictures of `body_pictures`"""
+SHOWN = {
+    "strain": ("shear_strain", SHEAR_STRAIN, "Accumulated plastic shear strain"),
+    "displacement": ("displacement", DISPLACEMENT, "Displacement"),
+}
+"""Pictures of the end: the values of the particles in frames, the quantity, and what captions call it"""
+COURANT = 0.5
+"""That of `Model.explicit`"""
+WATER = {"pore_pressure": ("pore_pressure", WATER_PRESSURE, "Pore pressure")}
+"""Another one, of soil with pore water"""
 
 
 def add_body_run_options(
@@ -58,6 +65,11 @@ def add_body_run_options(
     )
     add_number(run, "--rebalance", 1.2, "-",
                "repartition the mesh above this load imbalance: maximum over mean particles per rank", above=1)  # fmt: skip
+    add_body_file_options(p, frames)
+
+
+def add_body_file_options(p: ArgumentParser, frames: int) -> None:
+    """Options of the files of a run, and of its checkpoints."""
     files = p.add_argument_group("frames and pictures")
     add_count(files, "--frames", frames, "number of times at which particles are stored and drawn")
     add_output_options(files, PARTICLE_FIELDS)
@@ -87,8 +99,9 @@ def follow(
     *,
     shown: str,
     since: float = 0.0,
+    begin: Callable[..., Iterator[mpm.Report]] | None = None,
 ) -> BodyRun:
-    """Follow particles and bodies by the explicit scheme until a time [s]. Collective.
+    """Follow particles and bodies until a time [s]. Collective.
 
     The files of a body are ``body_0.csv`` and so on, in the order of ``Model.contacts``.
 
@@ -98,13 +111,17 @@ def follow(
         row: the values of a row, from the rows before it and the report; all ranks call it.
         shown: the column that the line of progress shows.
         since: when the run began [s]; a restart needs it.
+        begin: begins the run, as `Model.explicit` and `Model.implicit` do; by default the explicit scheme of the options.
     """
+    steps = begin or partial(model.explicit, rebalance=a.rebalance, **scheme(a))
     check_frames(model, a, folder)
+    if begin is None:
+        announce(a.study, model, until)
     again, comm = a.restart is not None, model.comm
     particles, mesh, bodies = (comm.bcast(numbered(folder, name, again)) for name in ("particles", "mesh", "bodies"))
     probes = [ProbeFile(folder / f"body_{k}.csv", contact, keep=again) for k, contact in enumerate(model.contacts)]
     kept: list[dict[str, np.ndarray]] = []
-    start, steps = perf_counter(), model.report().particle_steps
+    start, done = perf_counter(), model.report().particle_steps
     with (
         Interrupt(comm) as interrupt,
         History(folder / "history.csv", columns, comm, keep_before=model.time if again else None) as history,
@@ -120,7 +137,7 @@ def follow(
             files.write()
             for probe in probes:
                 probe.record()
-            kept.append(own_frame(model, report.time, averaged=a.nmd))
+            kept.append(own_frame(model, report.time, averaged=begin is None and a.nmd))
             progress.show(report.time, report.steps, **{shown: f"{history[shown][-1]:.4g}"})
 
         def between_steps() -> bool:
@@ -129,15 +146,7 @@ def follow(
 
         try:
             look(model.report())
-            run = model.explicit(
-                until,
-                every=(until - since) / a.frames,
-                since=since,
-                watch=between_steps,
-                rebalance=a.rebalance,
-                **scheme(a),
-            )
-            for report in run:
+            for report in steps(until, every=(until - since) / a.frames, since=since, watch=between_steps):
                 look(report)
                 if interrupt.requested():
                     checkpoints.save()
@@ -148,7 +157,7 @@ def follow(
             files.close()  # waits for the last frame
         except mpm.RunError as error:
             result.stopped = str(error)
-        result.particle_steps_per_second = (model.report().particle_steps - steps) / (perf_counter() - start)
+        result.particle_steps_per_second = (model.report().particle_steps - done) / (perf_counter() - start)
         for probe in probes:
             probe.close()
         frames = [gathered(comm, frame) for frame in kept]
@@ -157,27 +166,42 @@ def follow(
     return result
 
 
+def announce(study: str, model: mpm.Model, until: float) -> None:
+    """Say how large an explicit run will be, since its first report may take long. Collective."""
+    particles, steps = model.report().particles, (until - model.time) / (COURANT * model.critical_time_step())
+    if model.comm.rank == 0:
+        print(f"{study}: {particles} particles, some {max(steps, 1):.1g} steps", file=sys.stderr, flush=True)
+
+
 def body_pictures(
-    a: Namespace, scene: Scene | None, result: BodyRun, folder: Path, title: str, **look: Any
+    a: Namespace,
+    scene: Scene | None,
+    result: BodyRun,
+    folder: Path,
+    title: str,
+    *,
+    shown: Mapping[str, tuple[str, Quantity, str]] = SHOWN,
+    **look: Any,
 ) -> Pictures:
     """Strain and displacement in the end, and a film of the strain, with the bodies; nothing where there is no scene.
 
     Args:
         a: options with pictures and film.
-        title: stands above the first two.
+        title: stands above all but the film.
+        shown: pictures of the end, as in `SHOWN`; the film has the values of the first.
         look: further options of `save_particles` for these.
     """
     if scene is None or not a.pictures:
         return {}
     last = result.frames[-1]
-    kinds = {"strain": ("shear_strain", SHEAR_STRAIN), "displacement": ("displacement", DISPLACEMENT)}
     pictures: dict[str, Callable[[], object]] = {
         name: partial(save_particles, folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
                       title=title, bodies=last.get("bodies"), **look)
-        for name, (key, quantity) in kinds.items()
+        for name, (key, quantity, _) in shown.items()
     }  # fmt: skip
     if a.film:
-        pictures["film"] = partial(save_animation, folder / "film", scene, result.frames, "shear_strain", SHEAR_STRAIN)
+        key, quantity, _ = next(iter(shown.values()))
+        pictures["film"] = partial(save_animation, folder / "film", scene, result.frames, key, quantity)
     return pictures
 
 
@@ -211,7 +235,8 @@ def write_results(
         "time_s": report.time, "steps": report.steps, "unexplained_fraction_of_energy": report.unexplained_fraction,
         "particle_steps_per_second": result.particle_steps_per_second, "wall_seconds": perf_counter() - begin,
     }  # fmt: skip
-    page = Page(movies=list(movies), captions={**captions, **CAPTIONS})
+    ends = {name: f"{what} in the end" for name, (_, _, what) in (SHOWN | WATER).items()}
+    page = Page(movies=list(movies), captions=ends | dict(captions))
     code = write_summary(folder, a, summary, model.comm, page, pictures, said)
     return result.interrupted or code
 

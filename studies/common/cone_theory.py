@@ -1,8 +1,13 @@
-"""Cone resistance and the limit pressure of spherical cavities, as factors of the strength."""
+"""Cone resistance and the limit pressure of spherical cavities, as factors of the strength; penetration with partial drainage."""
 
 from __future__ import annotations
 
 import numpy as np
+
+import mpm_core as mpm
+
+STEEPNESS = np.sqrt(3.0)
+"""Height of a cone over its radius: 60 degrees at its tip"""
 
 
 def teh_houlsby(rigidity: float, roughness: float) -> float:
@@ -60,3 +65,28 @@ def spherical_limit_pressure(
         middle = 0.5 * (low + high)
         low, high = (middle, high) if series(middle) < goal else (low, middle)
     return float((3 * alpha * low / (2 + alpha) - 1) * yield_stress / (alpha - 1))
+
+
+def undrained_strength(law: mpm.CamClay, pressure: float) -> float:
+    """Undrained shear strength of Modified Cam-Clay in triaxial compression from an isotropic effective stress [Pa].
+
+    The specific volume stays, so that p ends at p0 (p_c / 2 p0)^(1 - kappa / lambda) with the attraction in both (Wood 1990, Soil
+    Behaviour and Critical State Soil Mechanics, 7.2).
+
+    Args:
+        pressure: initial effective stress [Pa].
+    """
+    start, yields = pressure + law.attraction, law.preconsolidation + law.attraction
+    end = start * (0.5 * yields / start) ** (1 - law.swelling / law.compression)
+    return float(0.5 * law.critical_slope * end)
+
+
+def drained_part(velocity: float) -> float:
+    """How far the net resistance of a cone has risen from that without drainage to that of drained clay, 0 to 1.
+
+    J. T. DeJong, M. Randolph, J. Geotech. Geoenviron. Eng. 138 (2012) 788: a fit to experiments in normally consolidated clay.
+
+    Args:
+        velocity: normalised, v d / c_v.
+    """
+    return 1 / (1 + velocity / 3)

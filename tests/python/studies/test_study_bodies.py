@@ -18,10 +18,16 @@ SMALL = {
     "barrier": "--cell-size 0.25 --particles-per-cell 3 --length 5 --duration 2 --frames 4 --no-film",
     "cone": "--cell-size 0.006 --particles-per-cell 3 --penetration 0.01 --speed 0.02 --width 5 --frames 8 --no-film",
     "footing_push": "--cell-size 0.1 --particles-per-cell 3 --penetration 0.02 --speed 5e-3 --frames 4 --no-film",
+    "piezocone": "--cell-size 0.0059 --penetration 0.003 --step 0.1 --width 8 --conductivity 1e-6 --frames 4 --no-film",
     "wall": "--cell-size 0.2 --particles-per-cell 3 --motion free --support 0.2 --frames 4 --no-film",
 }
 
-MEANS = {"force_factor", "load_factor", "cone_factor", "resistance_Pa", "coefficient", "wall_friction"}
+EVERY = {"piezocone": "3"}
+"""Steps between checkpoints; 40 of explicit runs"""
+MEANS = {
+    "force_factor", "load_factor", "cone_factor", "resistance_Pa", "coefficient", "wall_friction", "net_resistance_Pa",
+    "pore_pressure_ratio",
+}  # fmt: skip
 """Columns that are means since the row before, which a restart sets at another time"""
 
 
@@ -45,7 +51,9 @@ def row(folder, name="history.csv", number=-1):
 @pytest.fixture(scope="module", params=sorted(SMALL))
 def study(request, tmp_path_factory):
     """Its name, and the folder of a small run."""
-    return request.param, run(request.param, tmp_path_factory.mktemp(request.param), "--checkpoint-every", "40")
+    return request.param, run(
+        request.param, tmp_path_factory.mktemp(request.param), "--checkpoint-every", EVERY.get(request.param, "40")
+    )
 
 
 @pytest.mark.usefixtures("without_pictures")

@@ -1,4 +1,4 @@
-"""Theory of the study cone: limit pressures and cone factors."""
+"""Theory of the studies cone and piezocone: limit pressures, cone factors, strength and drainage of clay."""
 
 import sys
 from pathlib import Path
@@ -6,9 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import mpm_core as mpm
+
 sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
 
-from common.cone_theory import lu, spherical_limit_pressure, teh_houlsby  # noqa: E402
+from common.cone_theory import drained_part, lu, spherical_limit_pressure, teh_houlsby, undrained_strength  # noqa: E402
 
 
 @pytest.mark.parametrize("rigidity", [50, 100, 500])
@@ -64,3 +66,20 @@ def test_cone_factors_are_those_of_the_papers():
     assert [teh_houlsby(i, 0.0) for i in (50, 100, 200, 500)] == pytest.approx([8.35, 9.72, 11.34, 14.43], abs=6e-3)
     assert [lu(i, 0.0) for i in (50, 100, 200, 500)] == pytest.approx([9.66, 10.77, 11.88, 13.34], abs=6e-3)
     assert teh_houlsby(100, 1.0) - teh_houlsby(100, 0.0) == pytest.approx(2.4)
+
+
+@pytest.mark.parametrize("overconsolidation", [1.0, 3.0])
+def test_the_undrained_strength_of_clay_is_that_of_a_triaxial_test(overconsolidation):
+    clay = mpm.CamClay(
+        compression=0.2, swelling=0.04, critical_slope=0.92, poisson=0.25, void_ratio=1.5, attraction=2e3,
+        preconsolidation=overconsolidation * 100e3 * (1 + 1e-9),
+    )  # fmt: skip
+    test = mpm.ElementTest(clay, stress=[-100e3, -100e3, -100e3, 0, 0, 0])
+    for _ in range(4000):
+        test.step([1e-4 / 2, -1e-4, 1e-4 / 2, 0, 0, 0])
+    strength = 0.5 * (test.stress[0] - test.stress[1])
+    assert strength == pytest.approx(undrained_strength(clay, 100e3), rel=5e-3)  # increments are of first order
+
+
+def test_a_slow_cone_has_drained_clay_around_it():
+    assert [drained_part(v) for v in (0.0, 3.0, 30.0)] == pytest.approx([1.0, 0.5, 1 / 11])

@@ -1,0 +1,43 @@
+"""The study piezocone: clay that drains and clay that does not."""
+
+import json
+
+import pytest
+from study_main import ended
+
+SMALL = "--cell-size 0.0059 --penetration 0.02 --width 15 --frames 20 --no-pictures --no-film".split()
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """Summaries of a fast and of a slow cone."""
+    found = {}
+    for name, velocity in (("fast", "0.2"), ("slow", "2e-5")):
+        folder = tmp_path_factory.mktemp(name)
+        done = ended("piezocone", folder, *SMALL, "--conductivity", "1e-8", "--velocity", velocity)
+        assert done.returncode == 0, done.stderr
+        found[name] = json.loads((folder / "summary.json").read_text())
+    return found
+
+
+def test_the_slow_cone_meets_more_resistance_and_no_pore_pressure(results):
+    fast, slow = results["fast"], results["slow"]
+    assert fast["normalised_velocity"] == pytest.approx(1e4 * slow["normalised_velocity"], rel=1e-12)
+    assert fast["normalised_velocity"] > 1e3 and slow["normalised_velocity"] < 1
+    assert slow["net_resistance_Pa"] > 1.3 * fast["net_resistance_Pa"]
+    for place in ("face", "shoulder"):
+        pressure = f"pore_pressure_{place}_Pa"
+        assert fast[pressure] > 100e3  # more than the initial effective stress
+        assert abs(slow[pressure]) < 0.2 * fast[pressure]
+
+
+def test_the_resistance_without_drainage_approaches_that_of_clay(results):
+    # After a way of half a diameter it has three quarters of its final value; in deep clay factors are 10.5 to 11.3.
+    fast = results["fast"]
+    low, high = sorted(fast["undrained_cone_factors"].values())
+    assert 0.65 * low < fast["cone_factor"] < high
+
+
+def test_cells_that_are_too_large_are_refused(tmp_path):
+    done = ended("piezocone", tmp_path, "--cell-size", "0.01")
+    assert done.returncode == 2 and "--cell-size is 0.01 m, expected a third of --radius" in done.stderr
