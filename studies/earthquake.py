@@ -21,6 +21,7 @@ from common.earthquake_site import (
     FIELDS,
     STIFF,
     column_layers,
+    conversion_of,
     damping_of,
     laws_of,
     linear_column,
@@ -119,8 +120,9 @@ def parse(arguments: list[str] | None = None) -> Namespace:
 # --- 2. The earthquake -----------------------------------------------------------------------------------------------
 
 
-def shaken(a: Namespace, model: mpm.Model, until: float, folder: Path) -> tuple[History, list, mpm.Report]:
+def shaken(a: Namespace, model: mpm.Model, motion: mpm.Motion, folder: Path) -> tuple[History, list, mpm.Report]:
     """Run to the end; history, frames and the last report."""
+    until = float(motion.time[-1]) + a.rest
     right = a.level + a.height / np.tan(np.radians(a.angle))
     width = model.comm.allreduce(float(model.mesh.points[:, 0].max()), MPI.MAX)
     nodes = FollowedNodes(model, np.array([(a.level, a.height), (0, a.height), (width, 0), (0, 0)]))
@@ -128,7 +130,9 @@ def shaken(a: Namespace, model: mpm.Model, until: float, folder: Path) -> tuple[
     slope = numbers_in(model, cells_near(model, np.array(middle), 0.4 * a.height, [bridge.SOIL]))
     level = numbers_in(model, cells_near(model, np.array((0.0, 0.0)), 1.5 * a.cell_size, [bridge.SOIL]))
     frames, samples = [frame_at(model, 0.0)], max(a.frames, round(until / (2 * STEP)))
-    run = model.explicit(until, every=until / samples, rayleigh=damping_of(a), nmd=True)
+    run = model.explicit(
+        until, every=until / samples, rayleigh=damping_of(a), nmd=True, conversion=conversion_of(a, model, motion)
+    )
     with (
         History(folder / "history.csv", COLUMNS, comm) as history,
         Progress("earthquake", until, comm) as progress,
@@ -250,8 +254,7 @@ def main(arguments: list[str] | None = None) -> int:
     record = outcrop_motion(a)
     folder = open_results(a, comm)
     model = model_in_equilibrium(a, record[2])
-    until = float(record[2].time[-1]) + a.rest
-    history, frames, report = shaken(a, model, until, folder)
+    history, frames, report = shaken(a, model, record[2], folder)
     begins, slips = newmark(a, history)
     exact, found = ratios = amplified(a, record[2], history)
     linear = found["linear column of resting cells"][1]

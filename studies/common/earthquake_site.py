@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from dataclasses import replace
 
 import numpy as np
 from dolfinx.mesh import meshtags
 from mpi4py import MPI
+from mpm_core.mesh import cell_sizes
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -45,16 +47,17 @@ def outcrop_motion(a: Namespace) -> tuple[np.ndarray, np.ndarray, mpm.Motion]:
 
 
 def recorded(a: Namespace) -> tuple[np.ndarray, np.ndarray]:
-    """Times [s] and accelerations [m/s2] in the file of ``--accelerogram``."""
+    """Times from the first on [s] and accelerations [m/s2] in the file of ``--accelerogram``."""
     path = a.accelerogram
     if not any(line.split("#")[0].strip() for line in path.read_text(errors="replace").splitlines()):
         raise mpm.InputError(f"--accelerogram {path} is empty")
     try:
-        return mpm.read_acceleration(path, unit=a.unit)
+        time, acceleration = mpm.read_acceleration(path, unit=a.unit)
     except mpm.InputError as error:
         raise mpm.InputError(
             f"--accelerogram: expected two columns: time [s], acceleration [{a.unit}]; {error}"
         ) from None
+    return time - time[0], acceleration
 
 
 def damping_of(a: Namespace) -> mpm.Rayleigh:
@@ -141,3 +144,15 @@ def linear_column(a: Namespace, motion: mpm.Motion, until: float) -> tuple[np.nd
         rows.append((report.time, top.velocity()[0, 0]))
     time, velocity = np.array(rows).T
     return time, velocity
+
+
+def conversion_of(a: Namespace, model: mpm.Model, motion: mpm.Motion) -> mpm.Conversion:
+    """Criteria by which cells turn into particles: displacements count beyond those of level linear ground. Collective.
+
+    Otherwise a motion of more than a tenth of a cell turns all of the ground into particles, which then leave the mesh at its sides.
+    """
+    time, velocity = linear_column(a, motion, float(motion.time[-1]))
+    moved = np.cumsum(velocity) * (time[1] - time[0])
+    smallest = model.comm.allreduce(float(cell_sizes(model.cell_volumes, 2).min(initial=np.inf)), MPI.MIN)
+    usual = mpm.Conversion()
+    return replace(usual, displacement=usual.displacement + float(np.abs(moved).max()) / smallest)

@@ -95,8 +95,13 @@ def read_acceleration(path: str | os.PathLike[str], *, unit: str) -> tuple[NDArr
         with open(path, encoding="utf-8") as file:
             lines = [line.split("#")[0].replace(",", " ") for line in file]
         columns = np.loadtxt(lines, ndmin=2)
-    except (OSError, ValueError) as error:
+    except OSError as error:
         raise InputError(f"accelerogram {os.fspath(path)} cannot be read: {error}") from error
+    except ValueError as error:
+        raise InputError(
+            f"accelerogram {os.fspath(path)} cannot be read: {error}; expected lines of a time and an acceleration, divided by "
+            "blanks or a comma, and # before those of a header"
+        ) from error
     if columns.ndim != 2 or columns.shape[1] != 2:
         raise InputError(
             f"accelerogram {os.fspath(path)} has {columns.shape[-1]} columns, expected time and acceleration"

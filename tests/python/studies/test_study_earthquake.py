@@ -1,11 +1,13 @@
 """What the study earthquake compares with: sliding blocks, yield accelerations, layers over a half-space, and its motions."""
 
+import json
 import sys
 from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from study_main import ended
 
 sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
 
@@ -134,6 +136,35 @@ def test_a_recorded_motion_keeps_its_high_frequencies(tmp_path):
     np.testing.assert_allclose(found, acceleration, atol=1e-10)
     exact = np.append(0.0, np.cumsum(0.01 * (acceleration[1:] + acceleration[:-1])))
     np.testing.assert_allclose(motion.velocity, exact, atol=0.01 * abs(exact).max())
+
+
+@pytest.mark.parametrize("first", [-20.0, 100.0])
+def test_a_recorded_motion_begins_with_the_run_whatever_its_first_time(tmp_path, first):
+    """Records count time from midnight, or from the trigger: what lay before 0 was left out, and up to it nothing moved."""
+    time = 0.02 * np.arange(501)
+    acceleration = np.sin(4 * np.pi * time) * np.sin(0.1 * np.pi * time) ** 2
+    path = tmp_path / "record.txt"
+    np.savetxt(path, np.column_stack([first + time, acceleration]), fmt="%.12g")
+    read, _, motion = outcrop_motion(Namespace(accelerogram=path, unit="m/s2"))
+    np.testing.assert_allclose(read, time, atol=1e-9)
+    np.testing.assert_allclose(motion.velocity, as_motion(time, acceleration).velocity, atol=1e-9)
+
+
+def test_ground_that_moves_far_without_failing_stays_in_resting_cells(tmp_path):
+    """A wavelet that moves the outcrop by 0.4 m, a quarter of a cell: all ground turned into particles, which left the mesh."""
+    small = (
+        "--cell-size 2.5 --level 10 --soil-depth 5 --stiff-depth 5 --particles-per-cell 1 --cohesion 1e6 --no-pictures"
+    )
+    result = ended(
+        "earthquake",
+        tmp_path,
+        *small.split(),
+        *"--motion ricker --frequency 0.6 --peak 3 --duration 5 --rest 0".split(),
+    )
+    assert result.returncode == 0, result.stderr
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["converted_fraction"] == 0
+    assert abs(summary["slope_displacement_m"]) < 0.01
 
 
 def test_the_acceleration_of_a_motion_is_that_between_its_samples():
