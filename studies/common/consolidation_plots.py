@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -18,7 +17,7 @@ from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 from .animation import save_figure_film
 from .field_plots import Field
-from .figures import curve_figure, save_figure
+from .figures import curve_figure, label_axes, panel_figure, save_figure
 from .plots import CURVES, ROUND_TICKS, Quantity, paper_style
 
 EXCESS = Quantity("Excess pore pressure", "kPa", scale=1e-3, colours="viridis")
@@ -68,21 +67,13 @@ def _excess_figure(pictures: Sequence[ExcessPicture], scale: ExcessScale) -> Fig
     points = pictures[0].excess.points
     low, high = points.min(axis=0), points.max(axis=0)
     aspect, count, levels = (high[1] - low[1]) / (high[0] - low[0]), len(pictures), np.linspace(*scale.limits, 21)
-    rows, columns, size = (count, 1, (6.9, count * (5.8 * aspect + 0.4) + 0.5))
-    if aspect > 1:
-        rows, columns, size = 1, count, (count * (4.0 / aspect + 0.5) + 1.0, 4.8)
-    figure, panels = plt.subplots(
-        rows, columns, figsize=size, sharex=True, sharey=True, squeeze=False, layout="constrained"
-    )
+    figure, panels = panel_figure(count, aspect)
     for axes, picture in zip(panels.ravel(), pictures):
         _draw_excess(axes, picture, scale.enlarged, levels)
         axes.set(aspect="equal", xlim=(low[0], high[0]))
         axes.set_ylim(low[1], high[1] + 0.06 * (high[1] - low[1]))
     figure.suptitle(f"Displacements magnified {scale.enlarged:g} times", fontsize=9)
-    for axes in panels[-1]:
-        axes.set_xlabel("$x$ [m]")
-    for axes in panels[:, 0]:
-        axes.set_ylabel("$y$ [m]")
+    label_axes(panels, ("$x$ [m]", "$y$ [m]"))
     bar = figure.colorbar(
         ScalarMappable(Normalize(*scale.limits), EXCESS.colours), ax=panels.ravel().tolist(), shrink=0.8, pad=0.01
     )

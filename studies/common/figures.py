@@ -75,6 +75,33 @@ def curve_figure(path: Path, size: tuple[float, float] = (4.6, 3.2), panels: int
         save_figure(figure, path)
 
 
+def panel_figure(count: int, aspect: float, tall: float = 5.8) -> tuple[Figure, Any]:
+    """Equal panels (rows, columns) with common axes: above one another, or side by side where the body is higher than wide.
+
+    Args:
+        count: of the panels.
+        aspect: height of what they show over its width.
+        tall: height of a panel above others over its aspect [inches].
+    """
+    rows, columns, size = count, 1, (6.9, count * (tall * aspect + 0.4) + 0.5)
+    if aspect > 1:
+        rows, columns, size = 1, count, (count * max(4.0 / aspect + 0.5, 1.25) + 1.2, 4.8)
+    figure, panels = plt.subplots(
+        rows, columns, figsize=size, sharex=True, sharey=True, squeeze=False, layout="constrained"
+    )
+    for axes in panels.ravel() if aspect > 4 else ():
+        axes.tick_params(axis="x", labelrotation=90)  # else numbers lie on one another
+    return figure, panels
+
+
+def label_axes(panels: Any, labels: tuple[str, str]) -> None:
+    """Name the horizontal axes of the lowest panels and the vertical ones of the panels on the left."""
+    for axes in panels[-1]:
+        axes.set_xlabel(labels[0])
+    for axes in panels[:, 0]:
+        axes.set_ylabel(labels[1])
+
+
 def mark_few(figure: Figure) -> None:
     """Mark the points of curves that have one, which no line shows, or so few that the line between them says little.
 

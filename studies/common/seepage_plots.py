@@ -22,7 +22,7 @@ from fenics_bridge.water.boundary import value_at
 
 from .animation import save_figure_film
 from .field_plots import Field, gathered
-from .figures import save_figure
+from .figures import label_axes, panel_figure, save_figure
 from .plots import ROUND_TICKS, Quantity, paper_style
 from .water_table import draw_water_table, polyline_segments, top_with_water, water_legend, zero_line
 
@@ -118,6 +118,8 @@ def _scales(pictures: Sequence[FlowPicture], quantity: Quantity) -> tuple[np.nda
     """Of all pictures: values at which the colours of the quantity change, as shown, largest velocity [m/s] and height shown [m]."""
     every = np.concatenate([picture.values(quantity) for picture in pictures])
     low, high = pressure_limits(pictures) if quantity is PRESSURE else (every.min(), every.max())
+    if high - low < 1e-6 * max(abs(low), abs(high)):  # water at rest, but for round-off
+        low, high = low - 0.5, low + 0.5
     ticks = ROUND_TICKS.tick_values(low, high)
     parts = 2 * (len(ticks) - 1) if quantity is PRESSURE else 20  # so that pressures change their colour at zero
     fastest = max(float(np.linalg.norm(one.velocity, axis=1).max()) for one in pictures)
@@ -161,11 +163,10 @@ def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[n
     levels, fastest, top = scales
     aspect, limits = (top - low[1]) / (high[0] - low[0]), (levels[0], levels[-1])
     colours, norm = _colours(quantity, limits), Normalize(*limits)
-    figure, panels = plt.subplots(len(pictures), 1, figsize=(6.9, len(pictures) * (5.8 * aspect + 0.35) + 0.4), sharex=True,
-                                  squeeze=False, layout="constrained")  # fmt: skip
+    figure, panels = panel_figure(len(pictures), aspect)
     table, least = False, limits[0]
-    for axes, picture in zip(panels[:, 0], pictures):
-        axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], top), ylabel="$y$ [m]")
+    for axes, picture in zip(panels.ravel(), pictures):
+        axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], top))
         triangles = Triangulation(*picture.head.points.T, picture.head.cells)
         values, lines = picture.values(quantity), levels[1:-1]
         least = min(least, values.min())
@@ -175,11 +176,11 @@ def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[n
         _flow_lines(axes, triangles, picture, (low, high), fastest, DARK if quantity is PRESSURE else LIGHT)
         table = draw_water_table(axes, picture.table()) or table
         axes.add_collection(LineCollection(picture.head.outline, colors="black", linewidths=0.8))
-        axes.set_title(picture.name, loc="left", pad=3)
-    panels[-1, 0].set_xlabel("$x$ [m]")
+        axes.set_title(picture.name, loc="left", pad=14 if aspect > 1 else 3)  # above marks of the table
+    label_axes(panels, ("$x$ [m]", "$y$ [m]"))
     if table:
-        water_legend(panels[0, 0])
-    bar = figure.colorbar(ScalarMappable(norm, colours), ax=panels[:, 0].tolist(), shrink=0.7, pad=0.01,
+        water_legend(panels[0, 0], below=aspect > 1)
+    bar = figure.colorbar(ScalarMappable(norm, colours), ax=panels.ravel().tolist(), shrink=0.7, pad=0.01,
                           extend="min" if least < limits[0] else "neither")  # fmt: skip
     bar.set_label(quantity.label)
     return figure

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
@@ -19,7 +18,7 @@ import fenics_bridge as bridge
 from particle_player import axis_labels, boundary_edges
 
 from .field_plots import Field, gathered
-from .figures import Pictures, curve_figure, save_figure
+from .figures import Pictures, curve_figure, label_axes, panel_figure, save_figure
 from .plots import CURVES, Quantity, paper_style
 from .water_table import draw_water_table, level_line, top_with_water, water_legend
 
@@ -80,11 +79,10 @@ def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) 
     drawn = [v if is_strain else v[np.unique(s.field().cells)] for s, v in zip(stages, values)]
     limits = (0.0, max(float(np.quantile(v, 0.995)) for v in drawn) or 1.0)
     aspect = (box[1, 1] - box[0, 1]) / (box[1, 0] - box[0, 0])
-    (along, up), table = axis_labels(stages[0].displacement.half_section), False
+    table = False
     with paper_style():
-        figure, panels = plt.subplots(len(stages), 1, figsize=(6.9, len(stages) * (5.4 * aspect + 0.35) + 0.45), sharex=True,
-                                      squeeze=False, layout="constrained")  # fmt: skip
-        for axes, stage, shown in zip(panels[:, 0], stages, values):
+        figure, panels = panel_figure(len(stages), aspect, tall=5.4)
+        for axes, stage, shown in zip(panels.ravel(), stages, values):
             field = stage.field()
             per_cell, at_points = ({"facecolors": shown}, ()) if is_strain else ({"shading": "gouraud"}, (shown,))
             axes.tripcolor(*field.points.T, field.cells, *at_points, cmap=quantity.colours, vmin=limits[0], vmax=limits[1],
@@ -92,12 +90,12 @@ def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) 
             outline = field.points[boundary_edges(field.cells)]
             axes.add_collection(LineCollection(outline, colors="black", linewidths=0.7))
             axes.set_title(f"Stage: {stage.name}", loc="left", pad=3)
-            axes.set(aspect="equal", xlim=box[:, 0], ylim=box[:, 1], ylabel=up)
+            axes.set(aspect="equal", xlim=box[:, 0], ylim=box[:, 1])
             table = draw_water_table(axes, stage.water) or table
-        panels[-1, 0].set_xlabel(along)
+        label_axes(panels, axis_labels(stages[0].displacement.half_section))
         if table:
-            water_legend(panels[0, 0])
-        bar = figure.colorbar(ScalarMappable(Normalize(*limits), quantity.colours), ax=panels[:, 0].tolist(), shrink=0.6,
+            water_legend(panels[0, 0], below=aspect > 1)
+        bar = figure.colorbar(ScalarMappable(Normalize(*limits), quantity.colours), ax=panels.ravel().tolist(), shrink=0.6,
                               extend="max", pad=0.01)  # fmt: skip
         bar.set_label(quantity.label)
         save_figure(figure, path)

@@ -93,10 +93,14 @@ def draw_water_table(axes: Axes, segments: np.ndarray) -> bool:
     return len(seen) > 0
 
 
-def water_legend(axes: Axes) -> None:
-    """Name the line above the upper right corner of a panel, beside whatever legend the panel has."""
+def water_legend(axes: Axes, below: bool = False) -> None:
+    """Name the line above the upper right corner of a panel, beside whatever legend the panel has, or below a narrow one."""
+    place = (
+        {"loc": "upper left", "bbox_to_anchor": (-0.5, -0.12)}
+        if below
+        else {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
+    )
     handle = Line2D([], [], color=TABLE, linewidth=WIDTH, marker="v", markersize=MARKER - 1)
-    legend = Legend(axes, [handle], ["water table"], loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, frameon=False,
-                    fontsize=8)  # fmt: skip
+    legend = Legend(axes, [handle], ["water table"], **place, borderaxespad=0.1, frameon=False, fontsize=8)  # fmt: skip
     axes.add_artist(legend)
     legend.set_clip_on(False)  # what is clipped has no space in the layout
