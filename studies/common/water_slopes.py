@@ -16,6 +16,7 @@ import numpy as np
 from mpi4py import MPI
 
 import fenics_bridge as bridge
+import mpm_core as mpm
 from fenics_bridge import water
 
 from .field_files import FieldFiles
@@ -82,7 +83,13 @@ def safety(a: Namespace, slope: SlopeSite, pore_pressure: Callable, title: str) 
 def steady_safety(a: Namespace, slope: SlopeSite, time: float, title: str) -> bridge.Collapse:
     """The factor of safety under the steady flow that belongs to the boundary conditions at a time [s]. Collective."""
     flow = slope.seepage(slope.boundary_at(time))
-    flow.solve()
+    try:
+        flow.solve()
+    except mpm.InputError as error:
+        raise mpm.InputError(
+            f"{title}, the steady flow under the boundary conditions after {time_in_words(time)}: {error}; a reservoir that is emptied "
+            "keeps the level of the lowest ground at its boundary"
+        ) from None
     return safety(a, slope, flow.pore_pressure(a.suction), title)
 
 

@@ -74,6 +74,14 @@ def test_a_drawdown_in_no_time_begins_at_the_limit_without_drainage(tmp_path):
     assert 0 < summary["failure_time_days"] < 0.1
 
 
+def test_a_reservoir_that_falls_below_its_ground_is_said_to_have_no_steady_flow(tmp_path):
+    path = site("drawdown", tmp_path, ("[3.0, 1.0]", "[3.0, -9.0]"))
+    with pytest.raises(
+        InputError, match=r"slow drawdown, .*after 3 days: .*a reservoir that is emptied keeps the level"
+    ):
+        run("drawdown", path, tmp_path, "--days 3 --no-pictures")
+
+
 def test_slower_tables_take_longer(tmp_path):
     from common.slope_site import read_slope_site
 
