@@ -166,7 +166,13 @@ def raise_pressures(a: Namespace, model: mpm.Model) -> None:
         model.equilibrate(integration=INTEGRATIONS[a.integration], nmd=a.nmd)
         set_state(a, model)
     else:  # soil at yield: equilibrium of averaged forces takes too many steps, and the start moves it by less than 1 mm
-        model.equilibrate(integration=INTEGRATIONS[a.integration])
+        try:
+            model.equilibrate(integration=INTEGRATIONS[a.integration])
+        except mpm.RunError as error:
+            raise mpm.InputError(
+                f"--angle is {a.angle:g} degrees, at which the saturated slope does not stand before its pore pressures rise ({error}); "
+                "expected a smaller one, or a higher --friction-angle or --cohesion"
+            ) from error
     p.set("initial_position", p.position)  # displacements count from here
     raised = np.maximum(-a.pressure_ratio * p.stress[:, 1], 0.0)
     p.set("pore_pressure", p.pore_pressure + raised)

@@ -157,3 +157,9 @@ def test_options_of_the_other_law_are_refused(options, words, capsys):
     with pytest.raises(SystemExit):
         study.parse(options)
     assert words in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_slope_that_does_not_stand_before_it_liquefies_is_named(tmp_path):
+    # Seepage along an infinite slope: gamma'/gamma tan(phi) / tan(angle) = 0.5 tan(30) / tan(25) = 0.6
+    with pytest.raises(mpm.InputError, match="--angle is 25 degrees, at which the saturated slope does not stand"):
+        slid(tmp_path, "--angle", "25", "--friction-angle", "30", "--height", "2", "--runout-length", "10")
