@@ -58,6 +58,8 @@ FILTER = 1.5
 GHOST = mpm.GhostPenalty(stiffness=0.02, mass=1.0, filled=0.95)
 """Keeps pore pressures smooth in the cells beside the cone, which are not quite full; those that alternate where no water flows would
 take all effective stress from single particles"""
+NEWTON = mpm.Newton(max_iterations=50, max_halvings=8)
+"""Patient, where single particles beside the cone change between touching and not"""
 STEADY = 1 / 3
 """Last part of the way over which results are averaged"""
 
@@ -235,7 +237,7 @@ def draw_resistance(path: Path, a: Namespace, history: History) -> None:
         for name, colour in (("face", CURVES[1]), ("shoulder", CURVES[2])):
             panels[1].plot(1e-3 * history[f"pore_pressure_{name}_Pa"], ratio, color=colour, label=f"at the {name}")
         panels[1].set(xlabel="Excess pore pressure [kPa]")
-        panels[1].legend(loc="lower left")
+        panels[1].legend(loc="best")
         for axes in panels:
             axes.set(ylim=(ratio[-1], 0.0))
 
@@ -273,6 +275,7 @@ def main(arguments: list[str] | None = None) -> int:
         nmd=True,
         integration=mpm.Integration.MIXED,
         ghost=GHOST,
+        solver=NEWTON,
     )
     result = follow(a, model, a.penetration / a.velocity, COLUMNS, partial(row, a, model.contacts[0]), folder, shown="net_resistance_Pa",
                     begin=steps)  # fmt: skip
