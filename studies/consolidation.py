@@ -50,6 +50,8 @@ import mpm_core as mpm
 from fenics_bridge import water
 
 comm = MPI.COMM_WORLD
+SUCTION = 0.05
+"""Fall of the pore pressure below that at the beginning, over its largest rise, from which it is drawn: overshoots are smaller"""
 ELEMENTS = {"P2-P1": water.Element.TAYLOR_HOOD, "P1-P1": water.Element.STABILISED}
 
 
@@ -110,7 +112,13 @@ class Files(FieldFiles):
         self._start = model.pressure.x.array.copy()
         self._excess = fem.Function(model.pressure.function_space, name="excess_pore_pressure")
         settlements = (f"settlement_{name}_m" for name in self._names)
-        columns = ["time_days", *settlements, "largest_excess_pressure_Pa", "water_error_m2"]
+        columns = [
+            "time_days",
+            *settlements,
+            "largest_excess_pressure_Pa",
+            "least_excess_pressure_Pa",
+            "water_error_m2",
+        ]
         if particles is not None:
             columns += [f"settlement_{name}_particles_m" for name in self._names]
             columns += ["largest_excess_pressure_particles_Pa"]
@@ -120,12 +128,14 @@ class Files(FieldFiles):
         self._filmed, self._framed = filmed, -np.inf
 
     def row(self, report: water.ConsolidationReport | None = None) -> None:
-        """Add settlements and the largest excess pressure to the history. Collective."""
+        """Add settlements, the largest and the least excess pressure to the history. Collective."""
         model = self._model
         self._excess.x.array[:] = model.pressure.x.array - self._start
         largest = comm.allreduce(float(self._excess.x.array.max(initial=-np.inf)), MPI.MAX)
+        least = comm.allreduce(float(self._excess.x.array.min(initial=np.inf)), MPI.MIN)
         settled = comm.bcast(-model.evaluate_at(self._places)["displacement"][:, 1])
         values = {f"settlement_{name}_m": value for name, value in zip(self._names, settled)}
+        values |= {"largest_excess_pressure_Pa": largest, "least_excess_pressure_Pa": least}
         if self.particles is not None:
             if report is not None:
                 self.particles.follow(model.time, report.dt)
@@ -133,7 +143,7 @@ class Files(FieldFiles):
             values |= {f"settlement_{name}_particles_m": value for name, value in theirs}
             values["largest_excess_pressure_particles_Pa"] = self.particles.largest_excess()
         error = report.water_error if report else 0.0
-        self.history.add(time_days=model.time / DAY, largest_excess_pressure_Pa=largest, water_error_m2=error, **values)
+        self.history.add(time_days=model.time / DAY, water_error_m2=error, **values)
         if self._filmed:
             self.film.append(self._picture())
 
@@ -226,7 +236,10 @@ def drawn(site: ConsolidationSite, files: Files, folder: Path) -> Pictures:
     since = 0 if stages else 1  # the logarithm of time has no beginning
     days = history["time_days"][since:]
     settled = {name: 1e3 * history[f"settlement_{name}_m"][since:] for name in site.points}
-    largest = {"largest": 1e-3 * history["largest_excess_pressure_Pa"][since:]}
+    largest = {name: 1e-3 * history[f"{name}_excess_pressure_Pa"][since:] for name in ("largest", "least")}
+    falls = largest["least"].min(initial=0.0) < -SUCTION * np.abs(largest["largest"]).max(initial=0.0)
+    if not falls:
+        del largest["least"]
     x, theirs, settled_theirs, largest_theirs = next(iter(site.points.values()))[0], [], {}, {}
     if files.particles is not None:
         theirs = [frame for frame in files.particles.frames if frame is not None]
@@ -244,7 +257,7 @@ def drawn(site: ConsolidationSite, files: Files, folder: Path) -> Pictures:
             folder / "largest_excess.png",
             days,
             largest,
-            "Largest excess pore pressure [kPa]",
+            "Excess pore pressure [kPa]" if falls else "Largest excess pore pressure [kPa]",
             False,
             largest_theirs,
             stages,
@@ -295,6 +308,7 @@ def main(arguments: list[str] | None = None) -> int:
         "finished_run": stopped is None, "stopped_because": stopped,
         **{f"settlement_{name}_m": history[f"settlement_{name}_m"][-1] for name in site.points},
         "largest_excess_pressure_Pa": history["largest_excess_pressure_Pa"].max(),
+        "least_excess_pressure_Pa": history["least_excess_pressure_Pa"].min(),
         "largest_water_error_m2": np.abs(history["water_error_m2"]).max(),
         "last_time_days": model.time / DAY, "steps": len(history) - 1, "wall_seconds": perf_counter() - start,
     }  # fmt: skip

@@ -386,6 +386,26 @@ def test_a_layer_settles_as_terzaghi_says(elements, tmp_path):
     assert summary["largest_excess_pressure_Pa"] == pytest.approx(load, rel=0.01 if elements == "P1-P1" else 0.1)
 
 
+def test_a_load_that_goes_leaves_less_pressure_than_there_was(tmp_path):
+    """Half of the load goes after the layer has drained: the pressure falls by as much at once, and is drawn."""
+    import consolidation
+
+    _write_layer(tmp_path)
+    load = 20e3
+    (tmp_path / "layer.toml").write_text(
+        'mesh = "layer.geo"\n[soils.clay]\nunit_weight = 18e3\nconductivity = 1e-7\nmaterial = "elastic"\nyoung = 2e6\n'
+        "poisson = 0.3\n[boundaries.top]\nreservoir = 2.0\n"
+        f"[pressures]\ntop = [[0.0, 0.0], [0.001, {load}], [40.0, {load}], [40.001, {load / 2}]]\n[points]\nmiddle = [0.15, 2.0]\n"
+    )
+    folder = tmp_path / "results"
+    arguments = ["--site", tmp_path / "layer.toml", "--elements", "P1-P1", "--days", 41, "--first-step", 1e-3,
+                 "--growth", 2, "--frames", 2, "--no-film", "--output", folder]  # fmt: skip
+    assert consolidation.main([str(word) for word in arguments]) == 0
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["least_excess_pressure_Pa"] == pytest.approx(-load / 2, rel=0.02)
+    assert summary["largest_excess_pressure_Pa"] == pytest.approx(load, rel=0.02)
+
+
 def test_the_pressure_between_smooth_plates_rises_as_mandel_says():
     """The pressure in the middle over half the load reaches 1.1555 at a time factor of 0.084 (Poisson ratio 0)."""
     from common.consolidation_site import read_consolidation_site
