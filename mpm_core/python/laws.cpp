@@ -26,7 +26,8 @@ end without overstress.)")
       m, "CamClay", "Modified Cam-Clay with pressure-dependent elasticity.",
       R"(The state variable log_preconsolidation is the logarithm of the preconsolidation pressure over its initial
 value, attraction included in both; set it for points with another initial value. The time step follows from the
-modulus at twice the preconsolidation pressure.)");
+modulus at twice the preconsolidation pressure. Soil that loosens keeps a pressure of 1e-4 of the preconsolidation
+pressure of the start, attraction included in both.)");
   bind_law<NorSand>(m, "NorSand",
                     "NorSand: a critical state law for sand, silt and tailings, loose (static liquefaction) or dense.",
                     R"(With p = attraction - mean stress, q = sqrt(3 J2), void ratio e and image pressure p_i:

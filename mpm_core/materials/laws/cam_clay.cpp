@@ -196,14 +196,20 @@ Mask<T> yields(const Result<T>& trial)
   return trial.yield > 1e-12;
 }
 
+/// The pressure that soil keeps, over the preconsolidation pressure of the law's start. Without any it would have no
+/// stiffness, and round-off of the attraction less the stress would leave it without a next increment.
+constexpr double least_pressure = 1e-4;
+
 template <int D, class T>
 void write(const Start<T>& a, const Result<T>& r, const Deviators<D, T>& deviators, const PointBatch<D>& points,
            Index i)
 {
-  write_stress<D, T>(points, i, a.clay.attraction - r.pressure, r.ratio, r.shear, deviators);
+  const T least = T{} + least_pressure * a.clay.preconsolidation;
+  write_stress<D, T>(points, i, a.clay.attraction - larger(r.pressure, least), r.ratio, r.shear, deviators);
   const T q = root(larger(r.square, T{}));
   add_to_state<D, T>(points, i, 0, 2 * r.multiplier * r.ratio * q / a.clay.slope_squared);
-  add_to_state<D, T>(points, i, 1, a.plastic * r.x);
+  const T softest = (T{} + std::log(2 * least_pressure)) - load_as<T>(points.state[1] + i); // critical at that pressure
+  add_to_state<D, T>(points, i, 1, larger(a.plastic * r.x, softest));
   add_to_state<D, T>(points, i, 2, -a.volumetric);
 }
 

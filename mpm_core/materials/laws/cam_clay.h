@@ -12,7 +12,7 @@ namespace mpm::materials
 ///     q^2 / M^2 + p (p - p_c) <= 0.
 /// The flow is associated; p_c hardens by dp_c / p_c = -v / (compression - swelling) de_v^p. Elasticity has the bulk
 /// modulus K = v p / swelling and a constant Poisson's ratio. The specific volume v is that at the start of each
-/// increment.
+/// increment. Soil that loosens keeps a pressure of 1e-4 p_c of the start.
 /// Sources: Roscoe, Burland (1968), Engineering Plasticity, 535-609; Borja (1991), CMAME 92, 343-353 (the implicit
 /// return with secant moduli).
 struct CamClay

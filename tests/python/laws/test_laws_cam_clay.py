@@ -160,6 +160,21 @@ def test_without_pressure_a_point_fails_unless_there_is_attraction():
     assert batch.stress[0, 0] < 0
 
 
+def test_clay_that_was_torn_apart_goes_on():
+    """Without a least pressure, round-off of the attraction less the stress would leave no pressure, and no next increment."""
+    clay = mpm.CamClay(**PARAMETERS, preconsolidation=100e3, attraction=2e3)
+    test = mpm.ElementTest(clay, isotropic(90e3))
+    for _ in range(100):  # by exp(-50) in pressure
+        test.step([0.01, 0.01, 0.01, 0, 0, 0])
+    least = 1e-4 * 102e3
+    assert test.stress[:3] == pytest.approx(2e3 - least, rel=1e-9)
+    test.step([0.0] * 6)
+    assert test.stress[:3] == pytest.approx(2e3 - least, rel=1e-9)
+    for _ in range(100):
+        test.step([-0.01, -0.01, -0.01, 0, 0, 0])
+    assert (test.stress[:3] < -1e3).all()
+
+
 def test_a_point_may_begin_with_a_preconsolidation_of_its_own():
     state = np.array([[0.0, np.log(300e3 / 100e3), 0.0]])
     batch = Batch(CLAY, np.array([isotropic(250e3)]), np.zeros((1, 6)), state)
