@@ -202,13 +202,14 @@ def pressure_near(model: mpm.Model, place: np.ndarray, reach: float) -> float:
 
 def row(a: Namespace, body: mpm.RigidContact, history: History, report: mpm.Report) -> dict[str, float]:
     """A row of the history. Collective."""
-    model, depth = body.model, -float(body.displacement[1])
-    net = mean_force(history, body, report.time, 1) / section(model, a) - a.pressure
+    model, depth = body.model, abs(float(body.displacement[1]))
+    # The cone is in the ground from the start, under its pressure, though particles touch it in the first step only.
+    net = mean_force(history, body, report.time, 1) / section(model, a) - a.pressure if depth else 0.0
     shoulder, face = np.array([a.radius, -depth]), np.array([a.radius / 2, -depth - STEEPNESS * a.radius / 2])
     u1, u2 = (pressure_near(model, place, FILTER * a.cell_size) for place in (face, shoulder))
     return {
         "time_s": report.time, "penetration_m": depth, "net_resistance_Pa": net, "pore_pressure_face_Pa": u1, "pore_pressure_shoulder_Pa": u2,
-        "pore_pressure_ratio": u2 / net, "impulse_Ns": body.impulse[1], "contact_area_m2": body.area, "dt_s": report.dt,
+        "pore_pressure_ratio": u2 / net if net else 0.0, "impulse_Ns": body.impulse[1], "contact_area_m2": body.area, "dt_s": report.dt,
     }  # fmt: skip
 
 
@@ -239,7 +240,7 @@ def draw_resistance(path: Path, a: Namespace, history: History) -> None:
         panels[1].set(xlabel="Excess pore pressure [kPa]")
         panels[1].legend(loc="best")
         for axes in panels:
-            axes.set(ylim=(ratio[-1], 0.0))
+            axes.set(ylim=(ratio[-1] or 1.0, 0.0))
 
 
 def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> Pictures:
@@ -283,13 +284,14 @@ def main(arguments: list[str] | None = None) -> int:
     (strength, rigidity), speed = strength_and_rigidity(a), normalised_velocity(a)
     net = means["net_resistance_Pa"]
     results = {
-        **means, "pore_pressure_ratio": means["pore_pressure_shoulder_Pa"] / net, "cone_factor": net / strength,
+        **means, "pore_pressure_ratio": means["pore_pressure_shoulder_Pa"] / net if net else 0.0, "cone_factor": net / strength,
         "normalised_velocity": speed, "undrained_strength_Pa": strength, "rigidity_index": rigidity,
         "undrained_cone_factors": undrained_factors(rigidity), "drained_part_in_experiments": drained_part(speed),
     }  # fmt: skip
     others = ", ".join(f"{value:.2f} by {name}" for name, value in undrained_factors(rigidity).items())
-    said = (f"normalised velocity {speed:.3g}: net resistance {1e-3 * net:.0f} kPa, {net / strength:.2f} times the undrained strength "
-            f"(undrained clay: {others}); pore pressure at the shoulder {1e-3 * means['pore_pressure_shoulder_Pa']:.0f} kPa")  # fmt: skip
+    found = (f"net resistance {1e-3 * net:.0f} kPa, {net / strength:.2f} times the undrained strength (undrained clay: {others}); pore "
+             f"pressure at the shoulder {1e-3 * means['pore_pressure_shoulder_Pa']:.0f} kPa")  # fmt: skip
+    said = f"normalised velocity {speed:.3g}: " + (found if len(result.history) > 1 else "the cone has not moved")
     return write_results(
         a, model, result, folder, results, said, begin=begin,
         movies=[particle_movie("piezocone", scene, result.frames, WET_QUANTITIES | QUANTITIES)],

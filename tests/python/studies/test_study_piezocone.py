@@ -16,7 +16,7 @@ def results(tmp_path_factory):
         folder = tmp_path_factory.mktemp(name)
         done = ended("piezocone", folder, *SMALL, "--conductivity", "1e-8", "--velocity", velocity)
         assert done.returncode == 0, done.stderr
-        found[name] = json.loads((folder / "summary.json").read_text())
+        found[name] = json.loads((folder / "summary.json").read_text()) | {"folder": folder}
     return found
 
 
@@ -41,3 +41,16 @@ def test_the_resistance_without_drainage_approaches_that_of_clay(results):
 def test_cells_that_are_too_large_are_refused(tmp_path):
     done = ended("piezocone", tmp_path, "--cell-size", "0.01")
     assert done.returncode == 2 and "--cell-size is 0.01 m, expected a third of --radius" in done.stderr
+
+
+def test_the_net_resistance_begins_with_zero(results):
+    rows = (results["fast"]["folder"] / "history.csv").read_text().splitlines()
+    assert rows[1].split(",")[:6] == ["0"] * 6
+    assert float(rows[2].split(",")[2]) > 0
+
+
+def test_a_run_that_fails_at_once_says_that_the_cone_has_not_moved(tmp_path):
+    done = ended("piezocone", tmp_path, *SMALL, "--void-ratio", "0.001")
+    assert done.returncode == 1
+    assert "normalised velocity" in done.stdout and "the cone has not moved\n" in done.stdout
+    assert json.loads((tmp_path / "summary.json").read_text())["net_resistance_Pa"] == 0
