@@ -19,8 +19,8 @@ from time import perf_counter
 import numpy as np
 from common.body_runs import MAY_CHANGE, BodyRun, add_body_run_options, body_pictures, follow, mean_force, write_results
 from common.checkpoint import check_restart
-from common.checks import check_cells
-from common.cone_theory import STEEPNESS, lu, spherical_limit_pressure, teh_houlsby
+from common.checks import check_cells, say
+from common.cone_theory import STEEPNESS, beyond_factors, lu, spherical_limit_pressure, teh_houlsby
 from common.figures import Pictures, curve_figure
 from common.history import History
 from common.movie import particle_movie
@@ -82,6 +82,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     inside = 2.5 * a.radius * (way(a) + 1.5 * a.radius) / (a.coarsening * a.cell_size) ** 2
     check_cells(p, a, 2.3 * (inside + 12 * way(a) / a.cell_size), "--cell-size", "--radius", "--penetration")
     check_restart(p, a, MAY_CHANGE)
+    say(beyond_factors(a.rigidity) if a.friction_angle == 0 else "")
     return a
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common.checks import check_effect, say
+from common.checks import check_effect, low_pressure, say
 from common.cyclic_loading import CYCLIC, amplitude, cycles, draw_cycles, first_cycle
 from common.figures import curve_figure
 from common.history import History
@@ -30,8 +30,6 @@ import mpm_core as mpm
 
 SOFTEST = 10e3
 """Oedometric modulus [Pa] below which there is no soil: mud has some 50 kPa"""
-LOWEST = 1e3
-"""Pressure [Pa] below which it is more probably one in kPa"""
 OWN_STIFFNESS = ("cam-clay", "nor-sand", "sanisand")
 """Laws whose stiffness follows from the pressure"""
 PRECONSOLIDATED = {"cam-clay": ("--preconsolidation", 1.0), "nor-sand": ("--image-pressure", np.e)}
@@ -81,10 +79,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check(p, own or a.material != "viscoplastic" or a.rate is not None,
           "--material is viscoplastic, expected --rate with it: in an infinitely slow test the viscosity has no effect")  # fmt: skip
     say(in_percent(a))
-    say(
-        f"--pressure is {a.pressure:g} Pa, less than under 0.1 m of soil: {a.pressure:g} kPa are {a.pressure:g}e3"
-        * (0 < a.pressure < LOWEST)
-    )
+    say(low_pressure("--pressure", a.pressure))
     return a
 
 

@@ -11,6 +11,7 @@ by drainage with the trend of experiments (DeJong & Randolph 2012). The ground h
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -28,8 +29,8 @@ from common.body_runs import (
     write_results,
 )
 from common.checkpoint import check_restart
-from common.checks import check_cells
-from common.cone_theory import STEEPNESS, drained_part, lu, teh_houlsby, undrained_strength
+from common.checks import check_cells, low_pressure, say
+from common.cone_theory import STEEPNESS, beyond_factors, drained_part, lu, teh_houlsby, undrained_strength
 from common.figures import Pictures, curve_figure
 from common.history import History
 from common.movie import QUANTITIES, WET_QUANTITIES, particle_movie
@@ -60,6 +61,10 @@ GHOST = mpm.GhostPenalty(stiffness=0.02, mass=1.0, filled=0.95)
 take all effective stress from single particles"""
 NEWTON = mpm.Newton(max_iterations=50, max_halvings=8)
 """Patient, where single particles beside the cone change between touching and not"""
+LOOSEST, STEEPEST = 20.0, 3.0
+"""Void ratio and slope of the critical state line of hardly any soil"""
+INERTIA = 0.1
+"""Density times the square of the velocity, over the strength, from which inertia counts: it adds 3 % without drainage"""
 STEADY = 1 / 3
 """Last part of the way over which results are averaged"""
 
@@ -122,7 +127,28 @@ def parse(arguments: list[str] | None = None) -> Namespace:
         p, a, 2.3 * path * (a.radius / a.cell_size**2 + 10 / a.cell_size), "--cell-size", "--radius", "--penetration"
     )
     check_restart(p, a, FILES_MAY_CHANGE | {"step"})
+    for text in doubts(a):
+        say(text)
     return a
+
+
+def doubts(a: Namespace) -> Iterator[str]:
+    """Warnings of options that are probably mistakes, or for which the results mean something else; some are empty."""
+    yield low_pressure("--pressure", a.pressure)
+    if a.compression_slope * np.log(2) > a.void_ratio:
+        yield (f"--compression-slope {a.compression_slope:g} and --void-ratio {a.void_ratio:g}: twice the pressure would press out more than "
+               "the water of all pores; both are ratios, not in percent")  # fmt: skip
+    if a.void_ratio > LOOSEST:
+        yield f"--void-ratio is {a.void_ratio:g}, more than that of peat; {a.void_ratio:g} % are {a.void_ratio / 100:g}"
+    if a.critical_slope > STEEPEST:
+        friction = np.sin(np.radians(min(a.critical_slope, 90.0)))
+        yield (f"--critical-slope is {a.critical_slope:g}, more than the {STEEPEST:g} of a friction angle of 90 degrees; it is "
+               f"6 sin(phi) / (3 - sin(phi)), {6 * friction / (3 - friction):.2g} for {min(a.critical_slope, 90.0):g} degrees")  # fmt: skip
+    strength, rigidity = strength_and_rigidity(a)
+    yield beyond_factors(rigidity)
+    if density(a) * a.velocity**2 > INERTIA * strength:
+        yield (f"--velocity is {a.velocity:g} m/s: the inertia of the clay adds to the resistance above "
+               f"{np.sqrt(INERTIA * strength / density(a)):.2g} m/s; for less drainage take a smaller --conductivity")  # fmt: skip
 
 
 # --- 2. Ground and cone ----------------------------------------------------------------------------------------------
@@ -133,6 +159,12 @@ def soil(a: Namespace) -> mpm.CamClay:
     return mpm.CamClay(compression=a.compression_slope, swelling=a.swelling_slope, critical_slope=a.critical_slope, poisson=a.poisson,
                        preconsolidation=a.overconsolidation * a.pressure * (1 + 1e-6), void_ratio=a.void_ratio,
                        attraction=a.attraction)  # fmt: skip
+
+
+def density(a: Namespace) -> float:
+    """Of the saturated clay [kg/m3]."""
+    porosity = a.void_ratio / (1 + a.void_ratio)
+    return float(2700 * (1 - porosity) + 1000 * porosity)
 
 
 def normalised_velocity(a: Namespace) -> float:
@@ -171,7 +203,7 @@ def build(a: Namespace) -> mpm.Model:
         model.restore(a.restart)
         return model
     porosity = a.void_ratio / (1 + a.void_ratio)
-    model.seed(density=2700 * (1 - porosity) + 1000 * porosity, per_cell=a.particles_per_cell, cell_tag="soil")
+    model.seed(density=density(a), per_cell=a.particles_per_cell, cell_tag="soil")
     model.roller("axis", normal=(1, 0))
     for side in ("base", "top"):
         model.roller(side, normal=(0, 1))

@@ -52,6 +52,21 @@ def say(text: str) -> None:
         warnings.warn(text, RuntimeWarning, stacklevel=3)
 
 
+LOWEST = 1e3
+"""Pressure [Pa] below which it is more probably one in kPa"""
+
+
+def low_pressure(name: str, pressure: float) -> str:
+    """What a warning says of a pressure of soil that is probably in kPa; empty for others.
+
+    Args:
+        name: of the option.
+    """
+    if not 0 < pressure < LOWEST:
+        return ""
+    return f"{name} is {pressure:g} Pa, less than under 0.1 m of soil: {pressure:g} kPa are {pressure:g}e3"
+
+
 MOST_CELLS = 2e7
 """Number of cells above which a mesh is a mistake: on one machine it takes its memory"""
 

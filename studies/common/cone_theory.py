@@ -10,6 +10,17 @@ STEEPNESS = np.sqrt(3.0)
 """Height of a cone over its radius: 60 degrees at its tip"""
 
 
+STIFFEST, SOFTEST = 500.0, 50.0
+"""Rigidity indices between which `teh_houlsby` and `lu` were fitted"""
+
+
+def beyond_factors(rigidity: float) -> str:
+    """What a warning says of a rigidity index for which there are no cone factors; empty for others."""
+    if SOFTEST <= rigidity <= STIFFEST:
+        return ""
+    return f"the rigidity index is {rigidity:.3g}, beyond the {SOFTEST:g} to {STIFFEST:g} for which the cone factors of the literature hold"
+
+
 def teh_houlsby(rigidity: float, roughness: float) -> float:
     """Cone factor of a 60 degree cone in Tresca soil under an isotropic stress, with a smooth shaft.
 

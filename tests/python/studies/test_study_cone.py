@@ -1,5 +1,6 @@
 """Theory of the studies cone and piezocone: limit pressures, cone factors, strength and drainage of clay."""
 
+import importlib
 import sys
 from pathlib import Path
 
@@ -83,3 +84,12 @@ def test_the_undrained_strength_of_clay_is_that_of_a_triaxial_test(overconsolida
 
 def test_a_slow_cone_has_drained_clay_around_it():
     assert [drained_part(v) for v in (0.0, 3.0, 30.0)] == pytest.approx([1.0, 0.5, 1 / 11])
+
+
+@pytest.mark.parametrize(
+    ("options", "doubted"), [("50", False), ("500", False), ("20", True), ("20 --friction-angle 30", False)]
+)
+def test_a_rigidity_without_cone_factors_is_named(options, doubted, recwarn):
+    importlib.import_module("cone").parse(["--rigidity", *options.split()])
+    said = [str(w.message) for w in recwarn if w.category is RuntimeWarning]
+    assert any("the rigidity index is 20, beyond the 50 to 500" in text for text in said) == doubted

@@ -1,5 +1,6 @@
 """The study piezocone: clay that drains and clay that does not."""
 
+import importlib
 import json
 
 import pytest
@@ -54,3 +55,25 @@ def test_a_run_that_fails_at_once_says_that_the_cone_has_not_moved(tmp_path):
     assert done.returncode == 1
     assert "normalised velocity" in done.stdout and "the cone has not moved\n" in done.stdout
     assert json.loads((tmp_path / "summary.json").read_text())["net_resistance_Pa"] == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "doubt"),
+    [
+        ("--pressure 100", "--pressure is 100 Pa, less than under 0.1 m of soil: 100 kPa are 100e3"),
+        ("--void-ratio 150", "--void-ratio is 150, more than that of peat; 150 % are 1.5"),
+        ("--compression-slope 20", "twice the pressure would press out more than the water of all pores"),
+        ("--critical-slope 23", "6 sin(phi) / (3 - sin(phi)), 0.9 for 23 degrees"),
+        ("--overconsolidation 20", "the rigidity index is 13.1, beyond the 50 to 500"),
+        ("--velocity 2", "the inertia of the clay adds to the resistance above 1.3 m/s"),
+    ],
+)
+def test_probable_mistakes_are_named(options, doubt):
+    with pytest.warns(RuntimeWarning) as warned:
+        importlib.import_module("piezocone").parse(options.split())
+    assert any(doubt in str(w.message) for w in warned)
+
+
+def test_nothing_is_doubted_of_usual_clay(recwarn):
+    importlib.import_module("piezocone").parse([])
+    assert not [w for w in recwarn if w.category is RuntimeWarning]
