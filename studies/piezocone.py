@@ -42,6 +42,7 @@ from common.results import ROOT, open_results
 from common.scenes import scene_of
 from common.schemes import add_particles_per_cell
 from mpi4py import MPI
+from mpm_core.output import PARTICLE_FIELDS, WATER_FIELDS
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -111,7 +112,7 @@ def parser() -> ArgumentParser:
         at_most=1,
     )
     add_particles_per_cell(run, 6)
-    add_body_file_options(p, 60)
+    add_body_file_options(p, 60, (*PARTICLE_FIELDS, *WATER_FIELDS))
     return p
 
 

@@ -68,11 +68,15 @@ def add_body_run_options(
     add_body_file_options(p, frames)
 
 
-def add_body_file_options(p: ArgumentParser, frames: int) -> None:
-    """Options of the files of a run, and of its checkpoints."""
+def add_body_file_options(p: ArgumentParser, frames: int, fields: Sequence[str] = PARTICLE_FIELDS) -> None:
+    """Options of the files of a run, and of its checkpoints.
+
+    Args:
+        fields: of particles that there are.
+    """
     files = p.add_argument_group("frames and pictures")
     add_count(files, "--frames", frames, "number of times at which particles are stored and drawn")
-    add_output_options(files, PARTICLE_FIELDS)
+    add_output_options(files, fields)
     add_picture_options(files)
     add_checkpoint_options(p.add_argument_group("checkpoints"))
 

@@ -44,6 +44,10 @@ def test_cells_that_are_too_large_are_refused(tmp_path):
     assert done.returncode == 2 and "--cell-size is 0.01 m, expected a third of --radius" in done.stderr
 
 
+def test_files_for_paraview_have_the_pore_pressure(results):
+    assert 'Name="pore_pressure"' in (results["fast"]["folder"] / "particles.xdmf").read_text()
+
+
 def test_the_net_resistance_begins_with_zero(results):
     rows = (results["fast"]["folder"] / "history.csv").read_text().splitlines()
     assert rows[1].split(",")[:6] == ["0"] * 6
