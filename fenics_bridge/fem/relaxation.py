@@ -115,13 +115,14 @@ def relax(
     result, theta, scale = Relaxation(), FIRST, None
     tolerance = solver.relaxed_tolerance
     rate: np.ndarray | None = None
-    start = body.solution.x.array.copy()
+    start, moved = body.solution.x.array.copy(), False
     for _ in range(solver.max_steps):
         step = EquilibriumStep(body, laws, external, before, displacement, theta, scale)
         residuals = _solve_step(step, tolerance, None if rate is None else rate / theta)
         result.iterations += len(residuals) - 1
         if step.moves_supports:
             step.measure_reactions()
+            moved = True
         scale = step.scale
         if not residuals[-1] <= REDUCTION[1] * residuals[0] and not residuals[-1] <= 0.3 * tolerance:
             theta *= AFTER_FAILURE
@@ -137,7 +138,9 @@ def relax(
             reference += ELASTIC * (1 + theta) * result.growth[0]
         result.balanced = result.residual[-1] <= tolerance
         # A small part of a heavy body, as the soil below a footing, may fail under forces that are nothing to those of the whole.
-        if result.balanced and result.missing[-1] > LACKING and tolerance > FINEST * solver.relaxed_tolerance:
+        # Soil that supports move does not fail by its load.
+        lacks = not moved and result.missing[-1] > LACKING
+        if result.balanced and lacks and tolerance > FINEST * solver.relaxed_tolerance:
             tolerance, result.balanced = 0.1 * tolerance, False
         # Soil that is still elastic lacks nothing, however far the body is from equilibrium: both must be small.
         if result.balanced or max(result.residual[-1], result.missing[-1]) <= solver.missing_tolerance:
