@@ -9,6 +9,9 @@
 #include "model/material_points.h"
 #include "transfer/affine_field.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace mpm::implicit
 {
 namespace
@@ -22,10 +25,20 @@ Vector<D> slip_of(const std::vector<Column>* slips, Index p)
   return slip;
 }
 
+/// Springs carry the pressure of the pore water, too, also where the soil has hardly any stiffness of its own: a
+/// particle sinks in by a hundredth of its radius then.
+template <int D>
+ContactModuli with_water(const ContactModuli& of_soil, const Particles<D>& particles, Index p)
+{
+  constexpr double least = 20;
+  const double pressure = particles.pore_pressure[0].empty() ? 0 : std::abs(particles.pore_pressure[0][p]);
+  return {std::max(of_soil.compression, least * pressure), std::max(of_soil.shear, least * pressure)};
+}
+
 /// The particles of a run that touch a surface when the nodes move with a velocity over a time.
 template <class G, int D = G::dim>
 void find_touching(const Model<G>& model, SeenSurface<D> seen, const std::vector<Column>* slips, const Run& run,
-                   const ContactModuli& moduli, const std::vector<Column>* bonds, std::span<const Vector<D>> velocity,
+                   const ContactModuli& of_soil, const std::vector<Column>* bonds, std::span<const Vector<D>> velocity,
                    double dt, double volumetric, bool tangents, TrialContact<D>& trial)
 {
   const auto nodal = [velocity](Index i) -> const Vector<D>& { return velocity[static_cast<std::size_t>(i)]; };
@@ -34,6 +47,7 @@ void find_touching(const Model<G>& model, SeenSurface<D> seen, const std::vector
   {
     if (bonds && !is_tied(*bonds, p))
       continue;
+    const ContactModuli moduli = with_water(of_soil, model.particles, p);
     const Vector<D> x = at<D>(model.particles.position, p);
     const Vector<D> xi = difference<D>(x, model.mesh.shapes[run.cell].centre);
     Vector<D> u;

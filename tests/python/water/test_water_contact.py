@@ -18,10 +18,10 @@ def degree_of_terzaghi(factor):
     return 1 - np.sum(2 / m**2 * np.exp(-(m**2) * factor))
 
 
-def column_on_a_plane(width, counts, **plane):
+def column_on_a_plane(width, counts, law=ELASTIC, **plane):
     """A column 1 m high between smooth walls, whose lowest particles touch a plane."""
     domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (width, 1.0), counts)
-    model = mpm.Model(bridge.background_mesh(domain, None, facet_tags), ELASTIC)
+    model = mpm.Model(bridge.background_mesh(domain, None, facet_tags), law)
     model.seed(density=2000.0, per_cell=3)
     for side in (1, 2):
         model.roller(side, (1, 0))
@@ -126,6 +126,24 @@ def test_soil_that_does_not_drain_rubs_by_its_effective_stress(load, nmd):
     model.implicit(1.0, dt=0.5, quasi_static=True, nmd=nmd, integration=mpm.Integration.MIXED).last()
     assert -plane.force[1] / 0.4 == pytest.approx(20e3 + load, rel=1e-4)
     assert -plane.force[0] / 0.4 == pytest.approx(MU * 10e3, rel=0.02)  # 12.0 to 13.5 kPa with forces at the centres
+
+
+def test_clay_without_pressure_does_not_sink_into_a_surface():
+    """Water carries the load; springs as stiff as ten times the skeleton alone would let particles in by 0.04 of their radius."""
+    clay = mpm.CamClay(
+        compression=0.2, swelling=0.04, critical_slope=1.0, poisson=0.25, void_ratio=1.0, preconsolidation=100e3, attraction=500.0
+    )  # fmt: skip
+    load, own = 20e3, 3 * (0.75 / 1.25) * 2.0 * 1e3 / 0.04  # M of the skeleton, whose p is a hundredth of p_c
+    model, _ = column_on_a_plane(0.2, (2, 10), law=clay)
+    model.add_water(porosity=0.5, conductivity=1e-4, modulus=np.inf)
+    model.particles.set("stress", np.tile([-500.0, -500.0, -500.0, 0.0], (len(model.particles), 1)))
+    model.set_pore_pressure(load)
+    model.hold_pore_pressure(4, load)
+    model.press_surface(4, load + 500.0)
+    radius = 0.5 * np.sqrt(model.particles.volume.max())
+    base = mpm.Plane((0, model.gap(mpm.Plane((0, 0), normal=(0, 1)))), normal=(0, 1))
+    model.implicit(10.0, dt=5.0, quasi_static=True).last()
+    assert 1e-3 * radius < -model.gap(base) < 0.4 * 0.2 * radius * load / own
 
 
 def test_a_run_in_which_no_water_flows_through_a_cell_warns_of_its_friction():
