@@ -19,8 +19,8 @@ from time import perf_counter
 import numpy as np
 from common.body_runs import MAY_CHANGE, BodyRun, add_body_run_options, body_pictures, follow, mean_force, write_results
 from common.checkpoint import check_restart
-from common.checks import check_cells, say
-from common.cone_theory import STEEPNESS, beyond_factors, lu, spherical_limit_pressure, teh_houlsby
+from common.checks import check_cells, check_cells_of_radius, say
+from common.cone_theory import STEEPNESS, beyond_factors, clay_factors, spherical_limit_pressure
 from common.figures import Pictures, curve_figure
 from common.history import History
 from common.movie import particle_movie
@@ -75,8 +75,7 @@ def parser() -> ArgumentParser:
 def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     a = p.parse_args(arguments)
-    check(p, 3 * a.cell_size <= a.radius * (1 + 1e-9), lambda: f"--cell-size is {a.cell_size:g} m, expected a third of --radius, "
-          f"{a.radius:g} m, at most")  # fmt: skip
+    check_cells_of_radius(p, a)
     check(p, a.dilation_angle <= a.friction_angle, lambda: f"--dilation-angle is {a.dilation_angle:g} degrees, expected "
           f"--friction-angle, {a.friction_angle:g} degrees, at most")  # fmt: skip
     inside = 2.5 * a.radius * (way(a) + 1.5 * a.radius) / (a.coarsening * a.cell_size) ** 2
@@ -176,7 +175,7 @@ def estimates(a: Namespace) -> dict[str, float]:
     """Cone factors of the literature by their source."""
     rough = float(a.face == "rough")
     if a.friction_angle == 0:
-        return {"Teh & Houlsby 1991": teh_houlsby(a.rigidity, rough), "Lu et al. 2004": lu(a.rigidity, rough)}
+        return clay_factors(a.rigidity, rough)
     pressure = spherical_limit_pressure(young=young(a), poisson=a.poisson, cohesion=a.strength, friction_angle=a.friction_angle,
                                         dilation_angle=a.dilation_angle) / a.strength  # fmt: skip
     face = rough * (1 + pressure * np.tan(np.radians(a.friction_angle)))

@@ -29,8 +29,8 @@ from common.body_runs import (
     write_results,
 )
 from common.checkpoint import check_restart
-from common.checks import check_cells, low_pressure, say
-from common.cone_theory import STEEPNESS, beyond_factors, drained_part, lu, teh_houlsby, undrained_strength
+from common.checks import check_cells, check_cells_of_radius, low_pressure, say
+from common.cone_theory import STEEPNESS, beyond_factors, clay_factors, drained_part, undrained_strength
 from common.figures import Pictures, curve_figure
 from common.history import History
 from common.movie import QUANTITIES, WET_QUANTITIES, particle_movie
@@ -119,8 +119,7 @@ def parser() -> ArgumentParser:
 def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     a = p.parse_args(arguments)
-    check(p, 3 * a.cell_size <= a.radius * (1 + 1e-9), lambda: f"--cell-size is {a.cell_size:g} m, expected a third of --radius, "
-          f"{a.radius:g} m, at most")  # fmt: skip
+    check_cells_of_radius(p, a)
     check(p, a.swelling_slope < a.compression_slope, lambda: f"--swelling-slope is {a.swelling_slope:g}, expected less than "
           f"--compression-slope, {a.compression_slope:g}")  # fmt: skip
     path = a.penetration + (ABOVE + STEEPNESS) * a.radius
@@ -162,10 +161,13 @@ def soil(a: Namespace) -> mpm.CamClay:
                        attraction=a.attraction)  # fmt: skip
 
 
+def porosity(a: Namespace) -> float:
+    return float(a.void_ratio / (1 + a.void_ratio))
+
+
 def density(a: Namespace) -> float:
     """Of the saturated clay [kg/m3]."""
-    porosity = a.void_ratio / (1 + a.void_ratio)
-    return float(2700 * (1 - porosity) + 1000 * porosity)
+    return 2700 * (1 - porosity(a)) + 1000 * porosity(a)
 
 
 def normalised_velocity(a: Namespace) -> float:
@@ -203,7 +205,6 @@ def build(a: Namespace) -> mpm.Model:
     if a.restart is not None:
         model.restore(a.restart)
         return model
-    porosity = a.void_ratio / (1 + a.void_ratio)
     model.seed(density=density(a), per_cell=a.particles_per_cell, cell_tag="soil")
     model.roller("axis", normal=(1, 0))
     for side in ("base", "top"):
@@ -211,7 +212,7 @@ def build(a: Namespace) -> mpm.Model:
     stress = np.zeros((len(model.particles), 4))
     stress[:, :3] = -a.pressure
     model.particles.set("stress", stress)
-    model.add_water(porosity=porosity, conductivity=a.conductivity, modulus=np.inf)
+    model.add_water(porosity=porosity(a), conductivity=a.conductivity, modulus=np.inf)
     model.hold_pore_pressure("far", 0.0)
     model.press_surface("far", a.pressure)
     overlap = max(0.0, -model.gap(outline(a, 0.0)))  # of particles that are larger than their distance from the surface
@@ -262,7 +263,7 @@ def draw_resistance(path: Path, a: Namespace, history: History) -> None:
     with curve_figure(path, (6.2, 4.2), panels=2) as panels:
         ratio = history["penetration_m"] / (2 * a.radius)
         panels[0].plot(1e-3 * history["net_resistance_Pa"], ratio, color=CURVES[0])
-        for (name, factor), line in zip(undrained_factors(rigidity).items(), ("--", ":")):
+        for (name, factor), line in zip(clay_factors(rigidity, 0.0).items(), ("--", ":")):
             panels[0].axvline(1e-3 * factor * strength, color="black", linewidth=0.9, linestyle=line, label=name)
         panels[0].set(
             xlabel="Net resistance of the cone [kPa]", ylabel="Penetration over the diameter [-]", xlim=(0, None)
@@ -292,11 +293,6 @@ def drawn(a: Namespace, scene: Scene | None, result: BodyRun, folder: Path) -> P
 # --- 4. All together -------------------------------------------------------------------------------------------------
 
 
-def undrained_factors(rigidity: float) -> dict[str, float]:
-    """Cone factors of a smooth cone in clay by their source."""
-    return {"Teh & Houlsby 1991": teh_houlsby(rigidity, 0.0), "Lu et al. 2004": lu(rigidity, 0.0)}
-
-
 @without_warning(GATHERS)
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
@@ -315,13 +311,13 @@ def main(arguments: list[str] | None = None) -> int:
                     begin=steps)  # fmt: skip
     means, scene = in_the_end(result.history), scene_of(model, [1])
     (strength, rigidity), speed = strength_and_rigidity(a), normalised_velocity(a)
-    net = means["net_resistance_Pa"]
+    net, factors = means["net_resistance_Pa"], clay_factors(rigidity, 0.0)  # of a smooth cone
     results = {
         **means, "pore_pressure_ratio": means["pore_pressure_shoulder_Pa"] / net if net else 0.0, "cone_factor": net / strength,
         "normalised_velocity": speed, "undrained_strength_Pa": strength, "rigidity_index": rigidity,
-        "undrained_cone_factors": undrained_factors(rigidity), "drained_part_in_experiments": drained_part(speed),
+        "undrained_cone_factors": factors, "drained_part_in_experiments": drained_part(speed),
     }  # fmt: skip
-    others = ", ".join(f"{value:.2f} by {name}" for name, value in undrained_factors(rigidity).items())
+    others = ", ".join(f"{value:.2f} by {name}" for name, value in factors.items())
     found = (f"net resistance {1e-3 * net:.0f} kPa, {net / strength:.2f} times the undrained strength (undrained clay: {others}); pore "
              f"pressure at the shoulder {1e-3 * means['pore_pressure_shoulder_Pa']:.0f} kPa")  # fmt: skip
     said = f"normalised velocity {speed:.3g}: " + (found if len(result.history) > 1 else "the cone has not moved")

@@ -33,18 +33,18 @@ from .schemes import INTEGRATIONS, add_particles_per_cell, add_pic
 from .summary import write_summary
 
 FILES_MAY_CHANGE = {"frames", "checkpoint-every", "fields", "float64", "compression", "pictures", "film"}
-"""Those among them that say what is written"""
+"""Options that say what is written, with which any run may go on from a checkpoint in another way"""
 MAY_CHANGE = FILES_MAY_CHANGE | {"damping", "pic", "integration", "rebalance"}
-"""Options with which a run may go on from a checkpoint in another way: how it steps and what it writes"""
+"""The same of explicit runs, which may step in another way, too"""
 SHOWN = {
     "strain": ("shear_strain", SHEAR_STRAIN, "Accumulated plastic shear strain"),
     "displacement": ("displacement", DISPLACEMENT, "Displacement"),
 }
 """Pictures of the end: the values of the particles in frames, the quantity, and what captions call it"""
-COURANT = 0.5
-"""That of `Model.explicit`"""
 WATER = {"pore_pressure": ("pore_pressure", WATER_PRESSURE, "Pore pressure")}
 """Another one, of soil with pore water"""
+COURANT = 0.5
+"""That of `Model.explicit`"""
 
 
 def add_body_run_options(
@@ -187,7 +187,7 @@ def body_pictures(
     shown: Mapping[str, tuple[str, Quantity, str]] = SHOWN,
     **look: Any,
 ) -> Pictures:
-    """Strain and displacement in the end, and a film of the strain, with the bodies; nothing where there is no scene.
+    """Pictures of the end and a film, with the bodies; nothing where there is no scene.
 
     Args:
         a: options with pictures and film.

@@ -67,6 +67,15 @@ def low_pressure(name: str, pressure: float) -> str:
     return f"{name} is {pressure:g} Pa, less than under 0.1 m of soil: {pressure:g} kPa are {pressure:g}e3"
 
 
+def check_cells_of_radius(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    """End with an error where the cells beside a round body are larger than a third of its radius."""
+    check(
+        parser,
+        3 * options.cell_size <= options.radius * (1 + 1e-9),
+        lambda: f"--cell-size is {options.cell_size:g} m, expected a third of --radius, {options.radius:g} m, at most",
+    )
+
+
 MOST_CELLS = 2e7
 """Number of cells above which a mesh is a mistake: on one machine it takes its memory"""
 

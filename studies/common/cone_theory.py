@@ -42,6 +42,11 @@ def lu(rigidity: float, roughness: float) -> float:
     return 3.4 + 1.6 * np.log(rigidity) + 1.3 * roughness
 
 
+def clay_factors(rigidity: float, roughness: float) -> dict[str, float]:
+    """Both cone factors of clay by their source; rigidity, roughness as for `teh_houlsby`."""
+    return {"Teh & Houlsby 1991": teh_houlsby(rigidity, roughness), "Lu et al. 2004": lu(rigidity, roughness)}
+
+
 def spherical_limit_pressure(
     *, young: float, poisson: float, cohesion: float, friction_angle: float, dilation_angle: float
 ) -> float:
