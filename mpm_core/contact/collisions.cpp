@@ -148,7 +148,7 @@ std::optional<Meeting<D>> meeting_of(const Collision& collision, std::vector<Con
 {
   Contact<D>&ball = contacts[collision.ball], &other = contacts[collision.other];
   const Vector<D> centre = centre_now(ball);
-  const auto [apart, normal_at_start] = distance<D>(other.surface, as_at_start<D>(other.body, centre));
+  const auto [apart, normal_at_start, part] = distance<D>(other.surface, as_at_start<D>(other.body, centre));
   const double radius = std::get<Ball<D>>(ball.surface).radius;
   if (apart > radius)
     return std::nullopt;

@@ -1,13 +1,15 @@
 #pragma once
 /// @file
-/// Contact of particles with a rigid surface: a penalty on the gap, with friction and adhesion.
+/// Contact of particles with a rigid surface: a penalty on the gap, with friction, adhesion and turbulent resistance.
 ///
 /// The gap of a particle is its distance from the surface less its radius r_p = V_p^(1/D) / 2. With the velocity v of
 /// the nodes at its place, relative to the surface, the force on it is
 ///
-///     f = kappa <-(g + dt v_n)> n - kappa s,   kappa = beta m_p / dt_c^2,   |kappa s| <= mu f_n + a A_p
+///     f = kappa <-(g + dt v_n)> n - kappa s,   kappa = beta m_p / dt_c^2,
+///     |kappa s| <= mu f_n + (a + C rho v_t^2) A_p,
 ///
-/// with the elastic slip s, to which dt v_t is added before it is returned to the cone of friction. Since
+/// with the elastic slip s, to which dt v_t is added before it is returned to the cone of friction, which the velocity
+/// of sliding widens by the turbulent resistance of Voellmy (1955), C = g / xi. Since
 /// sum kappa_p N_i N_j <= beta / dt_c^2 M_ij and M_ij is below the lumped masses, contact has no frequency above
 /// sqrt(beta) / dt_c, whatever the soil and the mesh; and with the gap and the slip at the end of the step, the nodes
 /// never get more work from it than its springs give up, as long as beta dt^2 <= dt_c^2. With a body that moves freely
@@ -20,6 +22,7 @@
 #include "mesh/mesh.h"
 #include "particles/particles.h"
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 
@@ -40,14 +43,21 @@ struct CellBound
   bool blind = false;                                      ///< whether `distance` alone is known
 };
 
+/// Shear strength of a contact, mu sigma_n + a + C rho v^2.
+struct Resistance
+{
+  double friction = 0; ///< coefficient mu of Coulomb
+  double adhesion = 0; ///< shear strength without pressure [Pa]
+  double drag = 0;     ///< coefficient C of the square of the velocity of sliding; in explicit steps only
+};
+
 /// A rigid surface that touches the particles, how it moves, what it feels, and what it remembers.
 template <int D>
 struct Contact
 {
-  Surface<D> surface; ///< where it is at the start
-  double friction;    ///< coefficient mu of Coulomb
-  double adhesion;    ///< shear strength without pressure [Pa]
-  double penalty;     ///< beta, in (0, 1]
+  Surface<D> surface;                  ///< where it is at the start
+  std::vector<Resistance> resistances; ///< a single one, or one for each segment or triangle of the surface
+  double penalty;                      ///< beta, in (0, 1]
   RigidBody<D> body;
   std::string slip; ///< name of the particles' field with their elastic slip; empty where it is smooth
   std::string bond; ///< name of their field with 1 where they are tied to it, and where; empty where they only touch it
@@ -64,6 +74,21 @@ struct Contact
   double travel = 0;    ///< path of its fastest point since the bounds were found [m]
   double keeps_for = 0; ///< travel after which they are found again [m]
 };
+
+/// Shear strength where a particle is nearest to the surface.
+/// @param part  the segment or triangle there, see `Distance`
+template <int D>
+const Resistance& resistance_at(const Contact<D>& contact, Index part)
+{
+  return contact.resistances[contact.resistances.size() == 1 ? 0 : static_cast<std::size_t>(part)];
+}
+
+/// Whether the normal force of the contact causes friction anywhere.
+template <int D>
+bool has_friction(const Contact<D>& contact)
+{
+  return std::ranges::any_of(contact.resistances, [](const Resistance& strength) { return strength.friction > 0; });
+}
 
 /// A ball and another body that collide where they touch.
 struct Collision

@@ -53,8 +53,8 @@ Distance<D> distance_at(SeenSurface<D>& seen, const RigidBody<D>& body, const Ve
   std::optional<Distance<D>> found;
   if (seen.within > 0)
     found = distance_within<D>(surface, as_it_was, seen.parts, seen.within, seen.start);
-  const auto [apart, normal] = found ? *found : distance<D>(surface, as_it_was);
-  return {apart, rotated<D>(body.rotation, normal)};
+  const auto [apart, normal, part] = found ? *found : distance<D>(surface, as_it_was);
+  return {apart, rotated<D>(body.rotation, normal), part};
 }
 
 /// Derivative of the normal by the place: symmetric.
@@ -124,13 +124,13 @@ struct LongestSlip
 
 /// @param overlap  of the particle and the surface, over the length of the onset
 template <int D>
-LongestSlip longest_slip(const Contact<D>& contact, const Spring& spring, const WaterShare& water, double overlap,
+LongestSlip longest_slip(const Resistance& strength, const Spring& spring, const WaterShare& water, double overlap,
                          const EndTouch<D>& touch)
 {
   const double adheres = 1 / (1 + std::exp(-(overlap + farthest / 2) / 2)); // from nearly 0 at `farthest` to 1
   const double rises = 1 / (1 + std::exp(-overlap));                        // d depth / d overlap
-  const double stuck = contact.adhesion * touch.area / spring.shear;        // slip at which adhesion alone gives way
-  const double per_depth = contact.friction * spring.stiffness / spring.shear, grains = carried_by_grains(water);
+  const double stuck = strength.adhesion * touch.area / spring.shear;       // slip at which adhesion alone gives way
+  const double per_depth = strength.friction * spring.stiffness / spring.shear, grains = carried_by_grains(water);
   return {per_depth * grains * touch.depth + stuck * adheres,
           per_depth * grains * rises + stuck * adheres * (1 - adheres) / (2 * spring.onset),
           grains > 0 ? -per_depth * touch.depth * water.per_pressure : 0};
@@ -233,7 +233,7 @@ bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring&
   Vector<D> place;
   for (int i = 0; i < D; ++i)
     place[i] = x[i] + u[i];
-  const auto [apart, normal] = distance_at<D>(seen, end, place);
+  const auto [apart, normal, part] = distance_at<D>(seen, end, place);
   touch.normal = normal;
   touch.area = area_at<D>(spring, normal);
   const double overlap = (radius - apart) / spring.onset;
@@ -244,7 +244,7 @@ bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring&
     touch.arm[i] = place[i] - apart * normal[i] - end.displacement[i] - end.centre[i];
   const Relative<D> relative = relative_motion<D>(contact.body, end, u, touch.arm);
   const bool rough = !contact.slip.empty();
-  const LongestSlip longest = longest_slip<D>(contact, spring, water, overlap, touch);
+  const LongestSlip longest = longest_slip<D>(resistance_at(contact, part), spring, water, overlap, touch);
   touch.slip = rough ? old : Vector<D>{};
   if (rough)
     touch.sticks = update_slip<D>(normal, relative.motion, longest.value, touch.slip);

@@ -10,15 +10,14 @@
 ///     h = 1 / (1 + exp((g / d - 15) / 2)),
 ///
 /// with the part b of the normal force that the grains carry, 1 without water, and the moduli M of compression without
-/// lateral strain and G of shear of the soil in the cell, at least twenty times the pore pressure, and the slip s = P
-/// (s_0
-/// + w) along the surface, P = 1 - n n^T, before it is returned to the cone of friction. With beta = 0.2 the springs
-/// are ten times as stiff as the particle in compression and in shear; one as stiff as M along the surface of soil that
-/// keeps its volume, M >> G, would slip and stick in turns from one iteration to the next. A particle that is tied to
-/// the body has the force -kappa s of all its motion relative to it. The radius in g is that at the end, so that the
-/// next step begins with the forces with which this one ends; all else of the size is that at the start. The onset is
-/// smooth so that short enough steps always converge: a kink would look the same to any step. The tangent is that of
-/// this force; the curvature H = dn/dx of the surface is found by differences of its normal.
+/// lateral strain and G of shear of the soil in the cell, at least twenty times the pore pressure, and the slip
+/// s = P (s_0 + w) along the surface, P = 1 - n n^T, before it is returned to the cone of friction. With beta = 0.2 the
+/// springs are ten times as stiff as the particle in compression and in shear; one as stiff as M along the surface of
+/// soil that keeps its volume, M >> G, would slip and stick in turns from one iteration to the next. A particle that is
+/// tied to the body has the force -kappa s of all its motion relative to it. The radius in g is that at the end, so
+/// that the next step begins with the forces with which this one ends; all else of the size is that at the start. The
+/// onset is smooth so that short enough steps always converge: a kink would look the same to any step. The tangent is
+/// that of this force; the curvature H = dn/dx of the surface is found by differences of its normal.
 ///
 /// The force acts on the soil at the edge of the particle, x - r_p n at the step's start, by the linear functions of
 /// the particle's cell, also beyond that cell: there the stress of the soil ends, which balances all of the force then.

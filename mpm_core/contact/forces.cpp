@@ -65,9 +65,9 @@ Touch<D> touch_of(const Contact<D>& contact, const Press<D>& press, const Distan
                   const Vector<D>& velocity)
 {
   const RigidBody<D>& body = contact.body;
-  const auto& [apart, normal] = nearest;
+  const double apart = nearest.value;
   Touch<D> touch;
-  touch.normal = press.rotated ? rotated<D>(body.rotation, normal) : normal;
+  touch.normal = press.rotated ? rotated<D>(body.rotation, nearest.normal) : nearest.normal;
   for (int i = 0; i < D; ++i)
     touch.arm[i] = x[i] - apart * touch.normal[i] - body.displacement[i] - body.centre[i];
   const Vector<D> turned = press.turns ? rotated<D>(press.turn, touch.arm) : Vector<D>{};
@@ -135,6 +135,17 @@ std::optional<ParticleForce<D>> bond_force(const Press<D>& press, const Distance
   return found;
 }
 
+/// Shear strength by the velocity of a particle along the surface, C rho v^2 (Voellmy 1955) [Pa].
+template <int D>
+double turbulent_stress(const Resistance& strength, const Press<D>& press, const Touch<D>& touch,
+                        const Particles<D>& particles, Index p)
+{
+  if (strength.drag == 0)
+    return 0;
+  const Vector<D> sliding = tangential<D>(touch.motion, touch.normal);
+  return strength.drag * particles.mass[p] / particles.volume[p] * dot<D>(sliding, sliding) / (press.dt * press.dt);
+}
+
 /// Force on a particle, whose velocity is that of the nodes at its place; takes its slip along. None without contact,
 /// but beside water that moves by itself none only where the surface is farther than the particle's radius.
 template <class G, int D = G::dim>
@@ -174,7 +185,10 @@ std::optional<ParticleForce<D>> particle_force(const Press<D>& press, const Dist
   const WaterShare share{water ? water->fraction(particles.cell[p], touch.normal) : 0};
   if (press.slips)
   {
-    const double longest = contact.friction * carried_by_grains(share) * depth + contact.adhesion * area / stiffness;
+    const Resistance& strength = resistance_at(contact, nearest.part);
+    const double longest =
+        strength.friction * carried_by_grains(share) * depth +
+        (strength.adhesion + turbulent_stress(strength, press, touch, particles, p)) * area / stiffness;
     reaction.sticking += update_slip<D>(touch.normal, touch.motion, longest, slip) ? area : 0;
     for (std::size_t i = 0; i < D; ++i)
       (*press.slips)[i][p] = slip[i];

@@ -33,6 +33,12 @@ void look_at(const Polyline& line, std::size_t k, const Vector<2>& x, NearestOnL
     best = {k, along, squared, offset};
 }
 
+/// Whether a point is nearest to the corner at which its segment begins.
+bool is_at_start(const Polyline& line, const NearestOnLine& at)
+{
+  return at.along == 0 && (line.closed || at.segment > 0);
+}
+
 /// The box around a segment, without what is beyond the ends of a line.
 Region<2> box_of(const Polyline& line, std::size_t k)
 {
@@ -64,12 +70,18 @@ Vector<2> outward_at(const Polyline& line, const NearestOnLine& at)
 {
   const std::size_t n = segments_of(line);
   const Vector<2> normal = left_normal(line, at.segment);
-  const bool first = at.along == 0 && (line.closed || at.segment > 0);
+  const bool first = is_at_start(line, at);
   const bool last = at.along == 1 && (line.closed || at.segment + 1 < n);
   if (!first && !last)
     return normal;
   const Vector<2> other = left_normal(line, (at.segment + (first ? n - 1 : 1)) % n);
   return {normal[0] + other[0], normal[1] + other[1]};
+}
+
+Index part_at(const Polyline& line, const NearestOnLine& at)
+{
+  const std::size_t n = segments_of(line);
+  return static_cast<Index>(is_at_start(line, at) ? (at.segment + n - 1) % n : at.segment);
 }
 
 void add_segments(const Polyline& line, const Region<2>& region, std::vector<Index>& segments)

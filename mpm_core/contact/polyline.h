@@ -36,6 +36,9 @@ NearestOnLine nearest_on(const Polyline& line, const Vector<2>& x, std::span<con
 /// The outward direction where a point is nearest, of any length: its sign is right also at corners.
 Vector<2> outward_at(const Polyline& line, const NearestOnLine& at);
 
+/// The segment on which the nearest point is; of the two at a corner, the one that ends there.
+Index part_at(const Polyline& line, const NearestOnLine& at);
+
 /// Adds the numbers of the segments that may be in a region.
 void add_segments(const Polyline& line, const Region<2>& region, std::vector<Index>& segments);
 

@@ -58,20 +58,22 @@ Distance<2> distance_at(const Polyline& line, const NearestOnLine& nearest)
 {
   const Vector<2> out = outward_at(line, nearest);
   const double length = std::sqrt(nearest.squared);
+  const Index part = part_at(line, nearest);
   if (length == 0)
-    return {0, scaled<2>(out, 1 / norm<2>(out))};
+    return {0, scaled<2>(out, 1 / norm<2>(out)), part};
   const double sign = dot<2>(out, nearest.offset) < 0 ? -1 : 1;
-  return {sign * length, scaled<2>(nearest.offset, sign / length)};
+  return {sign * length, scaled<2>(nearest.offset, sign / length), part};
 }
 
 Distance<3> distance_at(const Triangles& triangles, const NearestOnTriangles& nearest)
 {
   const Vector<3> out = outward_at(triangles, nearest);
   const double height = dot<3>(out, nearest.offset), length = std::sqrt(nearest.squared);
+  const Index part = part_at(triangles, nearest);
   if (length == 0 || is_at_border(triangles, nearest))
-    return {height, out};
+    return {height, out, part};
   const double sign = height < 0 ? -1 : 1;
-  return {sign * length, scaled<3>(nearest.offset, sign / length)};
+  return {sign * length, scaled<3>(nearest.offset, sign / length), part};
 }
 
 Distance<2> distance_from(const Polyline& line, const Vector<2>& x) { return distance_at(line, nearest_on(line, x)); }
@@ -87,14 +89,14 @@ Distance<3> distance_from(const Revolved& solid, const Vector<3>& x)
   const double z = dot<3>(arm, solid.axis);
   const Vector<3> radial = difference<3>(arm, scaled<3>(solid.axis, z));
   const double r = norm<3>(radial);
-  const auto [value, normal] = distance_from(solid.section, {r, z});
+  const auto [value, normal, part] = distance_from(solid.section, {r, z});
   // On the axis any radial direction is as good; its part of the normal is zero but for the inside of the solid.
   const Vector<3> out = r > 0 ? scaled<3>(radial, 1 / r) : Vector<3>{};
   Vector<3> along;
   for (std::size_t i = 0; i < 3; ++i)
     along[i] = normal[0] * out[i] + normal[1] * solid.axis[i];
   const double length = norm<3>(along);
-  return {value, length > 0 ? scaled<3>(along, 1 / length) : solid.axis};
+  return {value, length > 0 ? scaled<3>(along, 1 / length) : solid.axis, part};
 }
 
 template <int D>

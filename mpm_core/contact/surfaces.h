@@ -50,6 +50,7 @@ struct Distance
 {
   double value; ///< [m]
   Vector<D> normal;
+  Index part = 0; ///< the segment of a polyline, or the triangle as it was given, on which the nearest point is
 };
 
 template <int D>

@@ -39,6 +39,17 @@ void find_vertex_normals(Triangles& surface)
   }
 }
 
+void find_first_at_vertices(Triangles& surface)
+{
+  surface.first_at_vertex.assign(surface.vertices.size(), std::numeric_limits<Index>::max());
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t)
+    for (Index vertex : surface.triangles[t])
+    {
+      Index& first = surface.first_at_vertex[static_cast<std::size_t>(vertex)];
+      first = std::min(first, surface.given[t]);
+    }
+}
+
 /// Triangles across each side, by sorting the sides.
 void find_neighbours(Triangles& surface)
 {
@@ -223,7 +234,7 @@ Vector<3> unit_normal(const Triangles& surface, Index t)
 
 Triangles make_triangles(std::vector<Vector<3>> vertices, std::vector<std::array<Index, 3>> triangles)
 {
-  Triangles surface{std::move(vertices), std::move(triangles), {}, {}, {}, {}, {}, {}};
+  Triangles surface{std::move(vertices), std::move(triangles), {}, {}, {}, {}, {}, {}, {}, {}};
   std::vector<Vector<3>> centres;
   for (const auto& [a, b, c] : surface.triangles)
   {
@@ -240,8 +251,10 @@ Triangles make_triangles(std::vector<Vector<3>> vertices, std::vector<std::array
   for (Index t : order)
     sorted.push_back(surface.triangles[static_cast<std::size_t>(t)]);
   surface.triangles = std::move(sorted);
+  surface.given = std::move(order);
   find_neighbours(surface);
   find_vertex_normals(surface);
+  find_first_at_vertices(surface);
   find_boxes_at_border(surface);
   return surface;
 }
@@ -322,6 +335,18 @@ Vector<3> outward_at(const Triangles& surface, const NearestOnTriangles& nearest
       normal = plus(normal, unit_normal(surface, other), 1);
   const double length = norm<3>(normal);
   return {normal[0] / length, normal[1] / length, normal[2] / length};
+}
+
+Index part_at(const Triangles& surface, const NearestOnTriangles& nearest)
+{
+  const auto t = static_cast<std::size_t>(nearest.triangle);
+  if (nearest.feature == 0)
+    return surface.given[t];
+  if (nearest.feature >= 4)
+    return surface
+        .first_at_vertex[static_cast<std::size_t>(surface.triangles[t][static_cast<std::size_t>(nearest.feature - 4)])];
+  const Index other = surface.neighbours[t][static_cast<std::size_t>(nearest.feature - 1)];
+  return other < 0 ? surface.given[t] : std::min(surface.given[t], surface.given[static_cast<std::size_t>(other)]);
 }
 
 bool is_at_border(const Triangles& surface, const NearestOnTriangles& nearest)

@@ -32,7 +32,9 @@ struct Triangles
 {
   std::vector<Vector<3>> vertices; ///< [m]
   std::vector<std::array<Index, 3>> triangles;
+  std::vector<Index> given;                     ///< number of each triangle in the order in which they were given
   std::vector<std::array<Index, 3>> neighbours; ///< across the side from vertex k to k + 1; -1 at a border
+  std::vector<Index> first_at_vertex;           ///< the least number, as given, of the triangles around a vertex
   std::vector<Vector<3>> vertex_normals;        ///< normals of the triangles around it, weighted with their angles
   std::vector<unsigned char> at_border;         ///< per vertex
   std::vector<TriangleBox> boxes;               ///< the root first
@@ -78,6 +80,10 @@ NearestOnTriangles walk_on(const Triangles& surface, const Vector<3>& x, Index f
 /// The outward direction where a point is nearest, of length 1: its sign is right also where it is nearest to a side or
 /// to a vertex (Baerentzen & Aanaes 2005).
 Vector<3> outward_at(const Triangles& surface, const NearestOnTriangles& nearest);
+
+/// Number, as given, of the triangle on which the nearest point is; the least one where that is on a side or a vertex,
+/// so that it does not depend on the search.
+Index part_at(const Triangles& surface, const NearestOnTriangles& nearest);
 
 /// Whether the nearest point is on a border.
 bool is_at_border(const Triangles& surface, const NearestOnTriangles& nearest);

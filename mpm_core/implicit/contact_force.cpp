@@ -56,7 +56,7 @@ void find_touching(const Model<G>& model, SeenSurface<D> seen, const std::vector
     TouchingParticle<D> found{p,  static_cast<Index>(run.cell),
                               {}, spring_of<G>(model.particles, p, moduli, seen.contact.penalty),
                               {}, radius_at_end<G>(model.particles, p, volumetric, u),
-                              u};
+                              u,  {}};
     bool touches = bonds;
     if (bonds)
       found.touch = tied_at_end<D>(seen, trial.end, found.spring, x, u, anchor_of<D>(*bonds, p));
@@ -210,7 +210,7 @@ void find_contacts(Model<G>& model, bool tangents, ImplicitStep<G>& step)
     const auto* slips = columns_of(model.particles, contact.slip);
     const auto* tied = columns_of(model.particles, contact.bond);
     const double travelled = contact.travel + step_travel(contact, trial.end, time.dt);
-    const bool wet = !step.pore.cells.empty() && contact.friction > 0;
+    const bool wet = !step.pore.cells.empty() && has_friction(contact);
     for (const Run& run : model.order.runs)
     {
       const auto cell = static_cast<std::size_t>(run.cell);

@@ -165,13 +165,13 @@ void bind_contacts_of(py::module_& m)
   m.def("smallest_gap",
         [](const Model<G>& model, const Surface<D>& surface) { return smallest_gap<G>(model, surface); });
   m.def("add_contact",
-        [](Model<G>& model, const Surface<D>& surface, double friction, double adhesion, double penalty,
-           const RigidBody<D>& body, const std::string& slip, const std::string& bond)
+        [](Model<G>& model, const Surface<D>& surface, const py::array_t<double, py::array::c_style>& strength,
+           double penalty, const RigidBody<D>& body, const std::string& slip, const std::string& bond)
         {
           Contact<D> contact{};
           contact.surface = surface;
-          contact.friction = friction;
-          contact.adhesion = adhesion;
+          for (py::ssize_t k = 0; k < strength.shape(0); ++k)
+            contact.resistances.push_back({strength.at(k, 0), strength.at(k, 1), strength.at(k, 2)});
           contact.penalty = penalty;
           contact.body = body;
           contact.slip = slip;

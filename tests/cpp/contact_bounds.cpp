@@ -65,6 +65,24 @@ Polyline wavy_line(int n, bool closed)
   return line;
 }
 
+/// Another strength for each part of the surface, so that forces show which one they were found on.
+template <int D>
+std::vector<Resistance> strengths_of(const Surface<D>& surface)
+{
+  std::size_t parts = 1;
+  if constexpr (D == 2)
+  {
+    if (const auto* line = std::get_if<Polyline>(&surface))
+      parts = line->points.size();
+  }
+  else if (const auto* triangles = std::get_if<Triangles>(&surface))
+    parts = triangles->triangles.size();
+  std::vector<Resistance> strengths;
+  for (std::size_t k = 0; k < parts; ++k)
+    strengths.push_back({0.2 + 0.2 * static_cast<double>(k) / static_cast<double>(parts), 0, 1e-3});
+  return strengths;
+}
+
 template <int D>
 Contact<D> moving(const Surface<D>& surface)
 {
@@ -75,7 +93,7 @@ Contact<D> moving(const Surface<D>& surface)
   body.prescribed_velocity.values[0][0] = 0.7;
   body.prescribed_spin = {{0.0}, {{0, 0, 2.0}}};
   body.force = {{0.0}, {Vector<D>{}}};
-  return {surface, 0.3, 0, 0.2, body, "slip", ""};
+  return {surface, strengths_of<D>(surface), 0.2, body, "slip", ""};
 }
 
 /// Forgets what is known of the surface: all particles are then looked at, and all of the surface for each.

@@ -19,7 +19,7 @@ def sliding_block(comm, owners_of=bands):
     grid = 0.0625 * (np.indices((16, 8)).reshape(2, -1).T + 0.5) + (1.013, 1.007)
     model.seed_points(grid, np.full(len(grid), 0.0625**2), density=1000.0)
     model.set_gravity((4.0, -9.0))
-    ground = model.add_contact(mpm.Polyline([(0.5, 0.99), (3.0, 0.95), (5.5, 0.7)]), friction=0.2)
+    ground = model.add_contact(mpm.Polyline([(0.5, 0.99), (3.0, 0.95), (5.5, 0.7)]), friction=[0.25, 0.15], drag=0.02)
     disc = model.add_contact(mpm.Disc((3.2, 1.2), 0.3), friction=0.4, velocity=(-0.5, 0.0))
     return model, ground, disc
 

@@ -89,6 +89,7 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
         self._collisions: list[dict[str, Any]] = []
         self._field_contacts: list[dict[str, Any]] = []
         self._triangulated: dict[str, Triangles] = {}  # their triangles by fingerprint, which checkpoints do not have
+        self._values_of_parts: dict[str, NDArray[np.float64]] = {}  # of their friction, adhesion and drag, likewise
         self._next_id = 0
         self._late: int | None = None  # first number of the particles that were placed after a rigid surface was added
         self._control: Any = None  # of the implicit run, a StepControl

@@ -19,6 +19,7 @@ from .checkpoint_file import Arrays, CheckpointFile, Column, write_file
 from .collective import collectively
 from .collisions import set_collisions
 from .contact import OF_SURFACES, set_contacts
+from .contact_strength import require_strengths
 from .description import parsed
 from .far_field import require_border
 from .field_contact import set_field_contacts
@@ -117,6 +118,7 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
     surfaces = [one["surface"] for one in there["contacts"]]
     surfaces += [one["interface"] for one in there["field_contacts"]]
     collectively(model.comm, lambda: require_surfaces(model, surfaces))
+    collectively(model.comm, lambda: require_strengths(model, there["contacts"]))
     collectively(model.comm, lambda: require_border(model, name, there["far_field"]))
     with CheckpointFile(name, model.comm) as file:
         if there["cuts"] and there["ranks"] == model.comm.size:

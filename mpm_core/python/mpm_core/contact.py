@@ -12,6 +12,15 @@ from . import _core
 from ._core import InputError
 from .checks import flag, positive, within
 from .collective import collectively
+from .contact_strength import (
+    checked_strength,
+    described_strength,
+    is_rough,
+    largest,
+    remember_strength,
+    strength_of,
+    strength_text,
+)
 from .input_warnings import warn_of_friction
 from .mesh import floats
 from .outlines import mesh_box
@@ -42,7 +51,7 @@ DEEPEST = 0.1
 
 
 def add_contact(
-    model: Model, surface: Surface, friction: float, adhesion: float, penalty: float, centre: ArrayLike | None,
+    model: Model, surface: Surface, friction: ArrayLike, adhesion: ArrayLike, drag: ArrayLike, penalty: float, centre: ArrayLike | None,
     velocity: Velocity, spin: Velocity, body: FreeBody | Servo | None, bonded: bool,
 ) -> RigidContact:  # fmt: skip
     """See `Model.add_contact`."""
@@ -50,22 +59,22 @@ def add_contact(
     def entry() -> dict[str, Any]:
         dim = model.mesh.dim
         about = checked(surface, dim)[1] if centre is None else floats("centre", centre, (dim,))
-        positive("friction", friction, "(a coefficient)", zero=True)
-        positive("adhesion", adhesion, "Pa", zero=True)
+        strength = checked_strength(surface, friction=friction, adhesion=adhesion, drag=drag)
+        described_as = described_strength(strength)
         within("penalty", penalty, 0, 1)
         positive("penalty", penalty, "(a ratio)")
-        if flag("bonded", bonded) and (friction or adhesion):
+        if flag("bonded", bonded) and is_rough(described_as):
             raise InputError(
-                f"friction is {friction} and adhesion {adhesion} Pa, expected 0 where bonded is True: nothing slides"
+                f"the surface has {strength_text(described_as)}, expected 0 where bonded is True: nothing slides"
             )
+        remember_strength(model, strength)
         return {
-            "surface": described(surface), "friction": float(friction), "adhesion": float(adhesion),
-            "penalty": float(penalty), "bonded": bool(bonded),
+            "surface": described(surface), **described_as, "penalty": float(penalty), "bonded": bool(bonded),
             "body": describe(surface, about, velocity, spin, body, geometry=model.geometry, time=model.time),
         }  # fmt: skip
 
     new = collectively(model.comm, entry)
-    warn_of_friction(model.comm, friction)
+    warn_of_friction(model.comm, largest(new["friction"]))
     if smallest_gap(model, surface) == np.inf:
         raise InputError("the model has no particles, seed some before surfaces are added")
     if not bonded:
@@ -162,7 +171,7 @@ def set_contacts(model: Model, entries: list[dict[str, Any]]) -> None:
     for number, entry in list(enumerate(entries))[known:]:
         surface, _ = surface_of(model, entry["surface"])._checked(dim)
         bonded = entry["bonded"]
-        slip = f"{_SLIP}{number}" if entry["friction"] > 0 or entry["adhesion"] > 0 else ""
+        slip = f"{_SLIP}{number}" if is_rough(entry) else ""
         bond = bond_name(number) if bonded else ""
         known_fields = {field["name"] for field in model.particles.schedule()}
         if slip and slip not in known_fields:
@@ -171,9 +180,7 @@ def set_contacts(model: Model, entries: list[dict[str, Any]]) -> None:
             meaning = f"1 where the particle is tied to rigid surface {number}, and the place where it was tied"
             model.add_field(bond, unit="m", meaning=meaning, components=dim + 1)
         body = rigid_body(entry["body"])
-        _core.add_contact(
-            model._core, surface, entry["friction"], entry["adhesion"], entry["penalty"], body, slip, bond
-        )
+        _core.add_contact(model._core, surface, strength_of(model, entry), entry["penalty"], body, slip, bond)
     model._contacts = entries
 
 
@@ -182,6 +189,13 @@ def refuse_contacts(model: Model, scheme: str) -> None:
     if model._contacts:
         kinds = ", ".join(entry["surface"]["kind"] for entry in model._contacts)
         raise InputError(f"the model has contact with rigid surfaces ({kinds}), which {scheme} does not support")
+
+
+def refuse_drag(model: Model, scheme: str) -> None:
+    """Raises InputError where a scheme would leave out the resistance that grows with velocity."""
+    for entry in model._contacts:
+        if largest(entry.get("drag", 0.0)) > 0:
+            raise InputError(f"drag of the {entry['surface']['kind']} is above 0, which {scheme} does not support")
 
 
 def refuse_driven_bodies(model: Model, scheme: str, *, second_order: bool) -> None:

@@ -26,8 +26,9 @@ class ContactMethods:
         self,
         surface: Surface,
         *,
-        friction: float = 0.0,
-        adhesion: float = 0.0,
+        friction: ArrayLike = 0.0,
+        adhesion: ArrayLike = 0.0,
+        drag: ArrayLike = 0.0,
         velocity: Velocity = None,
         spin: Velocity = None,
         body: FreeBody | Servo | None = None,
@@ -49,6 +50,9 @@ class ContactMethods:
                 water it acts by the effective stress.
             adhesion: shear strength of the contact without pressure [Pa], for instance that of the soil on a rough footing;
                 it acts only where the soil touches the surface, and does not resist tension.
+            drag: coefficient C of a resistance C rho v^2 that grows with the velocity v of sliding [-]: the turbulent resistance of
+                Voellmy (1955), C = g / xi with his coefficient xi, some 100 to 2000 m/s2. In explicit steps only. Friction, adhesion
+                and drag may each be given by part, one number for each segment of a `Polyline` or each of the `Triangles`.
             velocity: of the centre [m/s], shape (D,); or (times [s], velocities (n, D)), linear in between and constant
                 before and after; at rest by default. Along axes in which a body is free, its initial velocity.
             spin: angular velocity about the centre [rad/s], counterclockwise in two dimensions and shape (3,) in three; or
@@ -76,7 +80,7 @@ class ContactMethods:
             >>> ground.force
         """
         return add_contact(
-            cast("Model", self), surface, friction, adhesion, penalty, centre, velocity, spin, body, bonded
+            cast("Model", self), surface, friction, adhesion, drag, penalty, centre, velocity, spin, body, bonded
         )
 
     def gap(self, surface: Surface) -> float:

@@ -139,9 +139,11 @@ _BODY = {
     "start": _is_number, "mass": _is_number, "speed": _is_number, "velocity": _HISTORY, "spin": _HISTORY, "force": _HISTORY,
     "centre": [_is_number], "inertia": [_is_number], "drive": [{0, 1, 2}], "rotates": bool,
 }  # fmt: skip
-_CONTACT = {
-    "surface": _is_surface, "friction": _is_number, "adhesion": _is_number, "penalty": _is_number, "bonded": bool, "body": _BODY
+_STRENGTH = AnyOf([_is_positive, {"fingerprint": str, "parts": _is_count, "largest": _is_positive}])
+_OLD_CONTACT = {
+    "surface": _is_surface, "friction": _STRENGTH, "adhesion": _STRENGTH, "penalty": _is_number, "bonded": bool, "body": _BODY
 }  # fmt: skip
+_CONTACT = AnyOf([{**_OLD_CONTACT, "drag": _STRENGTH}, _OLD_CONTACT])
 _FIELD_CONTACT = {
     "first": _is_count, "second": _is_count, "friction": _is_number, "adhesion": _is_number, "interface": _is_surface
 }  # fmt: skip

@@ -12,7 +12,7 @@ from .absorbing import refuse_absorbing
 from .body import Body
 from .checks import count, flag, of_kind, positive, watcher
 from .collective import collectively
-from .contact import refuse_contacts, refuse_driven_bodies, require_new_soil_outside
+from .contact import refuse_contacts, refuse_drag, refuse_driven_bodies, require_new_soil_outside
 from .contact_methods import ContactMethods
 from .energy import energy_limit as checked_energy_limit
 from .equilibrium import find_equilibrium, refuse_beyond_equilibrium
@@ -324,6 +324,7 @@ class Model(ContactMethods, Body):
                 particles have the state after the last step that converged.
         """
         refuse_driven_bodies(self, "the implicit scheme", second_order=second_order)
+        refuse_drag(self, "the implicit scheme")
         if small_displacements:
             refuse_contacts(self, "the implicit scheme with small_displacements")
         if isinstance(solver, Relaxation):

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from .collisions import add_collision
+from .contact_strength import strength_text
 from .mesh import floats
 from .outlines import Outline, mesh_box, outline
 from .surface_description import place_of, surface_of
@@ -34,7 +35,7 @@ class RigidContact:
 
     def __repr__(self) -> str:
         entry = self.model._contacts[self._index]
-        how = "tied" if entry["bonded"] else f"friction {entry['friction']:g}, adhesion {entry['adhesion']:g} Pa"
+        how = "tied" if entry["bonded"] else strength_text(entry)
         return f"<RigidContact {self._number}: {surface_of(self.model, entry['surface'])!r}, {how}>"
 
     def _state(self) -> dict[str, Any]:

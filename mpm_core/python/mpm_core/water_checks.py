@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from . import _core
 from ._core import InputError
 from .checks import positive
+from .contact_strength import largest
 from .mesh import cell_sizes
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def require_soil(model: PoreWater) -> None:
 def undrained_friction(model: Model, until: float) -> str:
     """What a warning says of friction where the pore pressure has no time to follow the load; empty for others. Collective."""
     water = model._core.water
-    if water is None or not any(contact["friction"] > 0 for contact in model._contacts):
+    if water is None or not any(largest(contact["friction"]) > 0 for contact in model._contacts):
         return ""
     of_cells = (
         cell_sizes(model.mesh.cell_volumes, model.mesh.dim)[model.particles.cell] ** 2 / model.particles.conductivity

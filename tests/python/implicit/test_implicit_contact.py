@@ -243,7 +243,7 @@ def test_what_the_scheme_leaves_out_is_refused():
     for options in ({"small_displacements": True, "quasi_static": True}, {"solver": mpm.Relaxation()}):
         with pytest.raises(mpm.InputError, match=r"rigid surfaces \(Plane\)"):
             model.implicit(1.0, dt=0.1, **options)
-    with pytest.raises(mpm.InputError, match="friction is 0.3 and adhesion 0.0 Pa, expected 0 where bonded"):
+    with pytest.raises(mpm.InputError, match="the surface has friction 0.3, adhesion 0 Pa, expected 0 where bonded"):
         model.add_contact(mpm.Plane((0.5, 0.5), (0, 1)), friction=0.3, bonded=True)
     with pytest.raises(mpm.InputError, match="no particle is beside surface"):
         model.add_contact(mpm.Plane((0.2, 0.2), (0, 1)), bonded=True)
