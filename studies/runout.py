@@ -1,14 +1,17 @@
 """A slide runs out over terrain in three dimensions: over a valley given by formulas, or over a raster of elevations.
 
-Particles fill the body between the ground before the slide and the slip surface; friction acts between them and the
-remaining ground. Maps of the deposit, of the largest thickness and speed, and of the area that the slide has covered are
-written as ESRI ASCII grids or GeoTIFF and drawn over a hillshade.
+Particles fill the body between the ground before the slide and the slip surface; between them and the remaining ground act
+friction, adhesion and Voellmy's turbulent resistance, which maps may give from place to place. Maps of the deposit, of the largest thickness and speed, and of the area that the slide has covered are
+written as ESRI ASCII grids or GeoTIFF and drawn over a hillshade; so are the thickness and the speed over time at given places,
+and the forces on rigid structures.
 """
 
 from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -24,6 +27,10 @@ from common.output_options import add_picture_options
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
+from common.runout_ground import add_ground_options, check_ground, ground_strength
+from common.runout_places import Places, draw_places, read_places, results_at
+from common.runout_structures import Structure, add_structures, draw_forces, horizontal_force, read_structures
+from common.soils import add_law_options, check_law_options, law_of
 from common.summary import write_summary
 from common.terrain_plots import save_map
 from mpi4py import MPI
@@ -37,6 +44,8 @@ from fenics_bridge.terrain.slide import THINNEST
 comm = MPI.COMM_WORLD
 COLUMNS = ["time_s", "front_m", "centre_x_m", "centre_y_m", "centre_z_m", "fastest_m_per_s", "kinetic_energy_J",
            "ground_force_N", "dt_s"]  # fmt: skip
+UNSTRESSED = ("cam-clay", "nor-sand", "sanisand")
+"""Laws that cannot begin without stress, as a slide does"""
 LABELS = {"deposit": "Thickness of the deposit [m]", "most": "Largest thickness [m]", "speed": "Largest speed [m/s]"}
 
 
@@ -66,13 +75,28 @@ def parser() -> ArgumentParser:
     add_number(p, "--cell-size", 4.0, "m", "size of the cells where the slide runs", above=0)
     add_number(p, "--spacing", 1.33, "m", "distance between particles", above=0)
     add_number(p, "--headroom", 20.0, "m", "height of the background mesh above the ground", above=0)
-    add_number(
-        p, "--ground-friction-angle", 15.0, "degrees", "friction angle between slide and ground", at_least=0, below=90
-    )
     add_number(p, "--density", 1900.0, "kg/m3", "density of the slide", above=0)
     add_number(p, "--young", 5e6, "Pa", "Young's modulus; stiffer soil needs shorter steps", above=0)
+    add_number(p, "--poisson", 0.3, "-", "Poisson's ratio", above=-1, below=0.5)
     add_number(p, "--friction-angle", 28.0, "degrees", "friction angle of the slide", at_least=0, below=60)
-    add_number(p, "--cohesion", 500.0, "Pa", "cohesion of the slide", at_least=0)
+    add_number(p, "--dilation-angle", 0.0, "degrees", "dilation angle of the slide", at_least=0, below=60)
+    add_number(p, "--cohesion", 500.0, "Pa", "cohesion of the slide, or its undrained shear strength", at_least=0)
+    add_law_options(p)
+    add_ground_options(p)
+    ways = p.add_argument_group("in the way of the slide")
+    ways.add_argument("--places", type=Path, default=None, metavar="FILE",
+                      help="CSV file of places, a name, x and y [m] in each row, at which thickness and speed are recorded")  # fmt: skip
+    ways.add_argument("--structure", type=Path, nargs="*", default=[], metavar="FILE",
+                      help="closed surfaces of rigid structures (STL, OBJ and others) that stand in the ground; their forces are recorded")  # fmt: skip
+    add_number(
+        ways,
+        "--structure-friction-angle",
+        15.0,
+        "degrees",
+        "friction angle between slide and structures",
+        at_least=0,
+        below=90,
+    )
     add_number(p, "--pic", 0.01, "-", "PIC fraction in a critical time step", at_least=0, at_most=1)
     add_number(p, "--time", 20.0, "s", "duration", above=0)
     add_count(p, "--frames", 80, "times at which maps and particles are stored")
@@ -93,6 +117,16 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check_effect(p, options, options.terrain is not None, ("--crs",), "--terrain and --rupture")
     check_file(p, options.terrain, "--terrain")
     check_file(p, options.rupture, "--rupture")
+    check_file(p, options.places, "--places")
+    for path in options.structure:
+        check_file(p, path, "--structure")
+    check_effect(p, options, bool(options.structure), ("--structure-friction-angle",), "--structure")
+    check_law_options(p, options)
+    check(p, options.material not in UNSTRESSED, lambda: f"--material is {options.material}, expected a law that can begin without "
+          f"stress, as a slide does; {', '.join(UNSTRESSED)} cannot")  # fmt: skip
+    check(p, options.dilation_angle <= options.friction_angle, lambda: f"--dilation-angle is {options.dilation_angle:g} degrees, expected "
+          f"at most --friction-angle, {options.friction_angle:g} degrees")  # fmt: skip
+    check_ground(p, options)
     check(p, options.spacing <= options.cell_size, lambda: f"--spacing is {options.spacing:g} m, expected --cell-size, "
           f"{options.cell_size:g} m, at most")  # fmt: skip
     return options
@@ -175,12 +209,9 @@ def build(a: Namespace, before: terrain.Raster, rupture: terrain.Raster) -> tupl
         comm, rupture, cell_size=a.cell_size, height=a.headroom + float((before.values - rupture.values).max()),
         fine=fine_part(before, body_between(a, before, rupture)),
     )  # fmt: skip
-    soil = mpm.MohrCoulomb(
-        young=a.young, poisson=0.3, cohesion=a.cohesion, friction_angle=a.friction_angle, dilation_angle=0.0
-    )
-    model = mpm.Model(bridge.background_mesh(domain, facet_tags=facet_tags), soil)
-    friction = float(np.tan(np.radians(a.ground_friction_angle)))
-    ground, lift = terrain.seed_slide(model, before, rupture, spacing=a.spacing, density=a.density, friction=friction)
+    model = mpm.Model(bridge.background_mesh(domain, facet_tags=facet_tags), law_of(a))
+    strength = ground_strength(a, rupture)
+    ground, lift = terrain.seed_slide(model, before, rupture, spacing=a.spacing, density=a.density, **strength)
     model.outflow("sides")
     model.set_gravity((0.0, 0.0, -9.81))
     model.rebalance()
@@ -197,26 +228,40 @@ def centre(model: mpm.Model) -> np.ndarray:
     return sums[:3] / sums[3]
 
 
-def look(model: mpm.Model, ground: mpm.RigidContact, start: np.ndarray, report: mpm.Report) -> dict[str, float]:
+@dataclass
+class Watched:
+    """What the history of a slide follows: its maps, the ground, places and structures."""
+
+    maps: terrain.SlideMaps
+    ground: mpm.RigidContact
+    places: Places
+    structures: list[Structure]
+
+    @property
+    def columns(self) -> list[str]:
+        return [*COLUMNS, *self.places.columns, *(name for one in self.structures for name in one.columns)]
+
+
+def look(model: mpm.Model, watched: Watched, start: np.ndarray, report: mpm.Report) -> dict[str, float]:
     """A row of the history. Collective."""
+    forces = {name: force for one in watched.structures for name, force in one.row(report.time).items()}
     p, x = model.particles, centre(model)
     away = np.linalg.norm(p.position[:, :2] - start[:2], axis=1)
     fastest = np.linalg.norm(p.velocity, axis=1).max(initial=0.0)
     return {
         "time_s": report.time, "front_m": comm.allreduce(float(away.max(initial=0.0)), MPI.MAX), "centre_x_m": x[0],
         "centre_y_m": x[1], "centre_z_m": x[2], "fastest_m_per_s": comm.allreduce(float(fastest), MPI.MAX),
-        "kinetic_energy_J": report.kinetic_energy, "ground_force_N": float(np.linalg.norm(ground.force)), "dt_s": report.dt,
+        "kinetic_energy_J": report.kinetic_energy, "ground_force_N": float(np.linalg.norm(watched.ground.force)), "dt_s": report.dt,
+        **watched.places.row(watched.maps), **forces,
     }  # fmt: skip
 
 
-def run(
-    a: Namespace, model: mpm.Model, ground: mpm.RigidContact, maps: terrain.SlideMaps, folder: Path
-) -> tuple[History, str | None]:
+def run(a: Namespace, model: mpm.Model, watched: Watched, folder: Path) -> tuple[History, str | None]:
     """The slide, with its frames; its history, and why it ended early if it did. Collective."""
     start, stopped = centre(model), None
     with (
         Interrupt(comm) as interrupt,
-        History(folder / "history.csv", COLUMNS, comm) as history,
+        History(folder / "history.csv", watched.columns, comm) as history,
         ModelOutput(
             model,
             folder / "particles",
@@ -226,11 +271,16 @@ def run(
         ) as output,
         Progress("slide", a.time, comm) as progress,
     ):
-        history.add(**look(model, ground, start, model.report()))
+        history.add(**look(model, watched, start, model.report()))
         try:
             for report in model.explicit(a.time, every=a.time / a.frames, pic=a.pic, nmd=True, rebalance=1.3):
-                maps.record()
-                history.add(**look(model, ground, start, report))
+                if comm.allreduce(len(model.particles)) == 0:
+                    stopped = (
+                        f"all of the slide has left the mesh by {report.time:g} s, expected rasters beyond its reach"
+                    )
+                    break
+                watched.maps.record()
+                history.add(**look(model, watched, start, report))
                 output.write()
                 progress.show(report.time, report.steps, front=f"{history['front_m'][-1]:.1f} m")
                 if interrupt.requested():
@@ -253,17 +303,40 @@ def still_moving(history: History, mass: float) -> str:
     )
 
 
+def left_the_mesh(fraction: float) -> str:
+    """The end of a line of results: how much of the slide went beyond the rasters, where it is more than a hundredth."""
+    return (
+        f"; {fraction:.0%} of its mass left the mesh at its sides: use rasters beyond its reach"
+        if fraction > 0.01
+        else ""
+    )
+
+
 # --- 4. All together -------------------------------------------------------------------------------------------------
 
 
-def write_maps(a: Namespace, found: dict[str, terrain.Raster], rupture: terrain.Raster, folder: Path) -> Pictures:
+def write_maps(
+    a: Namespace, found: dict[str, terrain.Raster], rupture: terrain.Raster, watched: Watched, folder: Path
+) -> Pictures:
     """Maps as grids, the ground as a surface for ParaView, and pictures to draw. On the first rank."""
     for name, raster in found.items():
         terrain.write_raster(folder / f"{name}.{a.grids}", raster)
     rupture.triangles().write(folder / "ground.obj")
+    marks = {"bodies": [one.body for one in watched.structures], "places": watched.places}
     return {
-        name: partial(save_map, folder / f"{name}.png", rupture, found[name], label) for name, label in LABELS.items()
+        name: partial(save_map, folder / f"{name}.png", rupture, found[name], label, **marks)
+        for name, label in LABELS.items()
     }
+
+
+def curves(watched: Watched, history: History, folder: Path) -> Pictures:
+    """Pictures over time, to draw."""
+    pictures: dict[str, Callable[[], object]] = {}
+    if watched.places.names:
+        pictures["places"] = partial(draw_places, folder / "places.png", watched.places, history)
+    if watched.structures:
+        pictures["structures"] = partial(draw_forces, folder / "structures.png", watched.structures, history)
+    return pictures
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -271,16 +344,19 @@ def main(arguments: list[str] | None = None) -> int:
     begin = perf_counter()
     folder = open_results(a, comm)
     before, rupture = grounds(a)
+    places = Places() if a.places is None else read_places(a.places, rupture)
+    bodies = read_structures(a.structure)
     model, ground, lift = build(a, before, rupture)
-    maps = terrain.SlideMaps(model, rupture)
+    structures = add_structures(model, bodies, a.structure_friction_angle, a.cell_size)
+    watched = Watched(terrain.SlideMaps(model, rupture), ground, places, structures)
     particles, volume = comm.allreduce(len(model.particles)), comm.allreduce(float(model.particles.volume.sum()))
     top = comm.allreduce(float(model.particles.position[:, 2].max(initial=-np.inf)), MPI.MAX)
     if comm.rank == 0:
         print(f"{particles} particles, {volume:.4g} m3, lifted by {metres(lift)}", file=sys.stderr)
     start = perf_counter()
-    history, stopped = run(a, model, ground, maps, folder)
+    history, stopped = run(a, model, watched, folder)
     seconds, report = perf_counter() - start, model.report()
-    found = maps.maps()
+    found = watched.maps.maps()
     low = comm.allreduce(float(model.particles.position[:, 2].min(initial=np.inf)), MPI.MIN)
     x = np.array([history[f"centre_{axis}_m"] for axis in "xyz"])
     fall, travel = float(x[2, 0] - x[2, -1]), float(np.linalg.norm(x[:2, -1] - x[:2, 0]))
@@ -291,14 +367,19 @@ def main(arguments: list[str] | None = None) -> int:
         "fastest_m_per_s": float(history["fastest_m_per_s"].max()),
         "largest_deposit_m": float(np.nanmax(found["deposit"].values)),
         "reached_area_m2": float(found["reached"].values.sum() * rupture.spacing**2), "outflow_mass_kg": report.outflow_mass,
+        "places": results_at(places, history),
+        "largest_horizontal_force_N": {one.name: float(horizontal_force(one, history).max()) for one in structures},
         "particle_steps_per_second": report.particle_steps / seconds, "wall_seconds": perf_counter() - begin,
     }  # fmt: skip
-    pictures = write_maps(a, found, rupture, folder) if comm.rank == 0 else {}
+    pictures = (
+        {**write_maps(a, found, rupture, watched, folder), **curves(watched, history, folder)} if comm.rank == 0 else {}
+    )
     said = (
         f"front {summary['front_m']:.1f} m from the initial centre of mass; the centre of mass fell {fall:.1f} m over "
         f"{travel:.1f} m; fastest {summary['fastest_m_per_s']:.1f} m/s; {summary['particle_steps_per_second'] / 1e6:.1f} million "
         "particle-steps per second"
         + still_moving(history, a.density * volume - report.outflow_mass) * (stopped is None)
+        + left_the_mesh(report.outflow_mass / (a.density * volume))
     )
     return write_summary(folder, a, summary, comm, pictures=pictures if a.pictures else {}, said=said)
 

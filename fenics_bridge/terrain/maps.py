@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 import mpm_core as mpm
 from fenics_bridge.terrain.raster import Raster
@@ -34,13 +34,35 @@ class SlideMaps:
         for up, across, part in ((0, 0, (1 - s) * (1 - t)), (0, 1, s * (1 - t)), (1, 0, (1 - s) * t), (1, 1, s * t)):
             yield (row + up, column + across), part
 
-    def thickness(self) -> NDArray[np.float64]:
-        """Volume of the particles over area [m], shape (ny, nx): each gives it to the four points around it. Collective."""
+    def _per_area(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Sums of the particles' values over area, shape (ny, nx): each gives its own to the four points around it. Collective."""
         found = np.zeros(self.ground.values.shape)
         for places, part in self._around():
-            np.add.at(found, places, part * self.model.particles.volume / self.ground.spacing**2)
+            np.add.at(found, places, part * values / self.ground.spacing**2)
         self.model.comm.Allreduce(MPI.IN_PLACE, found)
         return found
+
+    def thickness(self) -> NDArray[np.float64]:
+        """Volume of the particles over area [m], shape (ny, nx). Collective."""
+        return self._per_area(self.model.particles.volume)
+
+    def at(self, places: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Thickness of the slide and its mean speed at places now. Collective.
+
+        Args:
+            places: [m], shape (n, 2).
+
+        Returns:
+            Thickness [m], measured vertically, and speed [m/s], the mean over the thickness, each of shape (n,); both are 0 where
+            the slide is thinner than ``least``.
+        """
+        p = self.model.particles
+        fields = (p.volume, p.volume * np.linalg.norm(p.velocity, axis=1))
+        volume, flux = (
+            Raster(self.ground.x, self.ground.y, self._per_area(field), self.ground.crs).at(places) for field in fields
+        )
+        there = volume >= self.least
+        return np.where(there, volume, 0.0), np.where(there, flux / np.where(there, volume, 1.0), 0.0)
 
     def record(self) -> None:
         """Include the present state in the greatest values. Collective."""

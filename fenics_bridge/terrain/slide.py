@@ -23,8 +23,9 @@ def seed_slide(
     *,
     spacing: float,
     density: float,
-    friction: float = 0.0,
-    adhesion: float = 0.0,
+    friction: float | Raster = 0.0,
+    adhesion: float | Raster = 0.0,
+    drag: float | Raster = 0.0,
     material: int = 0,
 ) -> tuple[Any, float]:
     """Fill the space between two rasters with particles, and let them touch the ground that is left. Collective.
@@ -39,21 +40,43 @@ def seed_slide(
         rupture: ground that remains.
         spacing: distance between particles [m].
         density: density of the soil [kg/m3].
-        friction: friction coefficient of the ground [-], see `mpm_core.Model.add_contact`.
+        friction: friction coefficient of the ground [-], see `mpm_core.Model.add_contact`; a raster where it differs from place to
+            place, which covers the ground and counts at the centres of its triangles.
         adhesion: adhesion of the ground [Pa], likewise.
+        drag: coefficient of its resistance that grows with the square of the velocity [-], likewise.
         material: number of the soil's law in the model.
 
     Returns:
         The contact with the ground, and the largest lift of a particle [m].
 
     Raises:
-        InputError: the rasters have other coordinate references, or no soil is between them. Raised on all ranks alike.
+        InputError: the rasters have other coordinate references, no soil is between them, or one of the ground's strength
+            does not cover it. Raised on all ranks alike.
     """
     surface = rupture.triangles()
+    strength = {
+        name: _by_triangle(name, value, rupture, surface)
+        for name, value in (("friction", friction), ("adhesion", adhesion), ("drag", drag))
+    }
     found = on_first_rank(model.comm, lambda: _points(before, rupture, surface, spacing))
     points, volumes, lift = model.comm.bcast(found)
     model.seed_points(points, volumes, density=density, material=material)
-    return model.add_contact(surface, friction=friction, adhesion=adhesion), lift
+    return model.add_contact(surface, **strength), lift
+
+
+def _by_triangle(name: str, value: float | Raster, ground: Raster, surface: mpm.Triangles) -> Any:
+    """A number, or the values of a raster at the centres of the triangles of the ground."""
+    if not isinstance(value, Raster):
+        return value
+    if value.crs != ground.crs:
+        raise InputError(f"{name} is in {value.crs!r}, expected {ground.crs!r} as the ground")
+    for axis in "xy":
+        there, needed = getattr(value, axis), getattr(ground, axis)
+        if there[0] > needed[0] + value.spacing or there[-1] < needed[-1] - value.spacing:
+            raise InputError(
+                f"{name} covers {axis} {there[0]:.10g} to {there[-1]:.10g} m, expected {needed[0]:.10g} to {needed[-1]:.10g} m as the ground"
+            )
+    return value.at(surface.vertices[surface.triangles].mean(axis=1))
 
 
 def _points(before: Any, rupture: Any, surface: Any, spacing: float) -> tuple[Any, ...]:

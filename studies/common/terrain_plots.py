@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import LightSource
 from matplotlib.patheffects import withStroke
 
+import mpm_core as mpm
 from fenics_bridge.terrain import Raster
 
 from .figures import save_figure
-from .plots import ROUND_TICKS, WIDTH, paper_style
+from .plots import BODY, ROUND_TICKS, WIDTH, paper_style
+from .runout_places import Places
 
 LIGHT = LightSource(azdeg=315, altdeg=45)
 
@@ -25,13 +29,22 @@ def hillshade(ground: Raster) -> np.ndarray:
     return shade
 
 
-def save_map(path: Path, ground: Raster, shown: Raster, label: str) -> None:
+def save_map(
+    path: Path,
+    ground: Raster,
+    shown: Raster,
+    label: str,
+    bodies: Sequence[mpm.Triangles] = (),
+    places: Places | None = None,
+) -> None:
     """Draw a map.
 
     Args:
         ground: what the hillshade and the contour lines are of.
         shown: what is drawn in colour; gaps are left open.
         label: with unit.
+        bodies: rigid structures, drawn in plan.
+        places: marked and named.
     """
     x, y = ground.x, ground.y
     h = ground.spacing / 2
@@ -49,6 +62,13 @@ def save_map(path: Path, ground: Raster, shown: Raster, label: str) -> None:
         colours = ax.imshow(
             np.ma.masked_invalid(shown.values), cmap="viridis", extent=extent, origin="lower", alpha=0.85
         )
+        for body in bodies:
+            corners = body.vertices[body.triangles][:, :, :2]
+            ax.add_collection(PolyCollection(corners, facecolors=BODY, edgecolors=BODY, linewidths=0.6, zorder=3))
+        for name, place in zip(places.names, places.points, strict=True) if places is not None else ():
+            ax.plot(*place, "o", color="white", markeredgecolor="black", markersize=4, zorder=4)
+            ax.annotate(name, place, xytext=(4, 3), textcoords="offset points", fontsize=7, zorder=4,
+                        path_effects=[withStroke(linewidth=1.5, foreground="white")])  # fmt: skip
         figure.colorbar(colours, ax=ax, label=label, shrink=0.9)
         ax.set(xlabel="$x$ [m]", ylabel="$y$ [m]", aspect="equal")
         ax.ticklabel_format(useOffset=False, style="plain")  # coordinates of a map as they are read there

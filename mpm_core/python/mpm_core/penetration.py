@@ -36,6 +36,8 @@ class PenetrationWatch:
         if not open_ones:
             return
         size = _cell_size(model)
+        if size == 0:  # all particles have left the mesh
+            return
         for k, contact, entry in open_ones:
             state = contact._state()
             cells = state["penetration"] / size
@@ -55,7 +57,7 @@ class PenetrationWatch:
 
 
 def _cell_size(model: Model) -> float:
-    """Mean size of the cells in which the particles are [m]. Collective."""
+    """Mean size of the cells in which the particles are [m], 0 without particles. Collective."""
     mesh, comm = model.mesh, model.comm
     sizes = cell_sizes(mesh.cell_volumes, mesh.points.shape[1])[model.particles.cell]
     return float(comm.allreduce(float(sizes.sum())) / max(1, comm.allreduce(len(sizes))))

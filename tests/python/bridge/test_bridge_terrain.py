@@ -151,13 +151,13 @@ def slab(thickness=2.0, slope=-0.5):
     return terrain.Raster(rupture.x, rupture.y, rupture.values + thickness * on), rupture
 
 
-def slide_model(before, rupture, **options):
+def slide_model(before, rupture, cohesion=1.0, **options):
     domain, _, tags = terrain.terrain_mesh(
         COMM, rupture, cell_size=1.0, height=5.0, fine=((103, 203), (125, 217)), coarse_size=2.0
     )
     model = mpm.Model(
         bridge.background_mesh(domain, facet_tags=tags),
-        mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=1.0, friction_angle=30),
+        mpm.MohrCoulomb(young=1e6, poisson=0.3, cohesion=cohesion, friction_angle=30),
     )
     return model, *terrain.seed_slide(model, before, rupture, spacing=0.5, density=1800.0, **options)
 
@@ -197,6 +197,49 @@ def test_a_slide_has_the_volume_between_the_rasters_and_slides_as_coulomb_says()
     moved = model.particles.displacement[inner] @ (np.cos(theta), 0, -np.sin(theta))
     assert moved.mean() == pytest.approx(a * (rise**2 / 6 + rise * u / 2 + u**2 / 2), rel=0.05)
     assert ground.sticking_fraction < 0.1
+
+
+def test_ground_may_differ_from_place_to_place():
+    # Two slabs that do not spread: one on ground with the friction 0.1, north of y = 210 m one with 0.3; both feel the turbulent resistance C v^2 / h
+    # of Voellmy: with h = 2 m cos(theta) across the slope, x = v_t^2 / a ln cosh(a t / v_t), v_t^2 = a h / C.
+    before, rupture = slab()
+    _, y = np.meshgrid(rupture.x, rupture.y)
+    before = terrain.Raster(before.x, before.y, np.where(abs(y - 210) < 1.5, rupture.values, before.values))
+    friction = terrain.Raster(rupture.x, rupture.y, np.where(y < 210, 0.1, 0.3))
+    drag = terrain.Raster(rupture.x, rupture.y, np.full(y.shape, 1.0))
+    model, ground, _ = slide_model(before, rupture, cohesion=50e3, friction=friction, drag=drag)
+    model.set_gravity((0.0, 0.0, -9.81), ramp=0.1)
+    theta, end = np.arctan(0.5), 0.8
+    list(model.explicit(end, energy_limit=np.inf))
+    x, p = model.particles.initial_position, model.particles
+    for mu, side in ((0.1, -1), (0.3, 1)):
+        inner = (np.abs(x[:, 0] - 108) < 3) & (np.abs(x[:, 1] - (210 + 3 * side)) < 1)
+        moved = (p.displacement[inner] @ (np.cos(theta), 0, -np.sin(theta))).mean()
+        a = 9.81 * (np.sin(theta) - mu * np.cos(theta))
+        limit = np.sqrt(a * 2 * np.cos(theta) / 1.0)
+        assert moved == pytest.approx(limit**2 / a * np.log(np.cosh(a * (end - 0.05) / limit)), rel=0.1)
+    assert "friction up to 0.3, adhesion 0 Pa, drag up to 1" in repr(ground)
+
+
+@pytest.mark.parametrize("values, message", [
+    (terrain.Raster(np.arange(100.0, 120.0), np.arange(200.0, 221.0), np.full((21, 20), 0.2)), "friction covers x 100 to 119 m, expected 100 to 130 m"),
+    (terrain.Raster(np.arange(100.0, 131.0), np.arange(200.0, 221.0), np.full((21, 31), 0.2), "EPSG:25832"), "friction is in 'EPSG:25832', expected 'local'"),
+    (terrain.Raster(np.arange(100.0, 131.0), np.arange(200.0, 221.0), np.full((21, 31), -0.2)), "friction is -0.2"),
+])  # fmt: skip
+def test_rasters_of_the_ground_that_do_not_fit_are_named(values, message):
+    with pytest.raises(bridge.InputError, match=message):
+        slide_model(*slab(), friction=values)
+
+
+def test_thickness_and_speed_at_places():
+    before, rupture = slab()
+    model, *_ = slide_model(before, rupture)
+    speeds = np.where(model.particles.position[:, 2] > rupture.at(model.particles.position) + 1.0, 3.0, 1.0)
+    model.particles.set("velocity", speeds[:, None] * (0.0, 0.6, 0.8))
+    maps = terrain.SlideMaps(model, rupture)
+    thickness, speed = maps.at([(108.0, 210.0), (120.0, 210.0), (107.3, 208.8)])
+    assert thickness == pytest.approx([2.0, 0.0, 2.0], rel=0.02, abs=0)
+    assert speed == pytest.approx([2.0, 0.0, 2.0], rel=0.02, abs=0)  # the mean of 1 and 3 m/s
 
 
 def test_maps_keep_the_volume_and_the_greatest_values():

@@ -1,11 +1,13 @@
-"""Run-out over terrain: rasters that do not fit together, and a slide that still moves in the end."""
+"""Run-out over terrain: rasters that do not fit together, the strength of the ground, places, structures, and the end of a slide."""
 
 import importlib
 import sys
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
+from study_main import ended
 
 import mpm_core as mpm
 
@@ -85,3 +87,143 @@ def test_a_slide_that_still_moves_is_said(last, said):
     history = {"kinetic_energy_J": np.array([0.0, 1000.0, last])}
     words = importlib.import_module("runout").still_moving(history, 100.0)  # sqrt(2 x 200 J / 100 kg) = 2 m/s
     assert said in words and bool(words) == bool(said)
+
+
+def strength(*words):
+    runout = importlib.import_module("runout")
+    a = runout.parse(list(words))
+    _, rupture = runout.grounds(a)
+    return runout.ground_strength(a, rupture), rupture
+
+
+def map_of(path, rupture, values):
+    """A raster over all of the ground, with the last value where x is above its middle, else the first."""
+    from fenics_bridge import terrain
+
+    x, _ = np.meshgrid(rupture.x, rupture.y)
+    terrain.write_raster(
+        path, terrain.Raster(rupture.x, rupture.y, np.where(x > rupture.x.mean(), values[1], values[0]))
+    )
+    return str(path)
+
+
+def test_the_strength_of_the_ground_follows_its_options(tmp_path):
+    # tan(20) (1 - 0.4), and g / xi
+    found, rupture = strength(
+        "--ground-friction-angle",
+        "20",
+        "--pore-pressure-ratio",
+        "0.4",
+        "--turbulence",
+        "500",
+        "--ground-adhesion",
+        "2e3",
+    )
+    assert found["friction"] == pytest.approx(0.6 * np.tan(np.radians(20)))
+    assert found["drag"] == pytest.approx(9.81 / 500) and found["adhesion"] == 2e3
+    angles, turbulence = (
+        map_of(tmp_path / name, rupture, values) for name, values in (("f.asc", (10, 30)), ("t.asc", (200, 2000)))
+    )
+    found, _ = strength("--friction-map", angles, "--turbulence-map", turbulence, "--pore-pressure-ratio", "0.5")
+    assert found["friction"].values[0, [0, -1]] == pytest.approx(0.5 * np.tan(np.radians([10, 30])))
+    assert found["drag"].values[0, [0, -1]] == pytest.approx(9.81 / np.array([200, 2000]))
+
+
+@pytest.mark.parametrize("option, values, message", [
+    ("--friction-map", (-1, 30), "--friction-map has values of -1 to 30, expected angles from 0 to below 90 degrees"),
+    ("--turbulence-map", (0, 500), "--turbulence-map has values from 0 on, expected some above 0 m/s2"),
+])  # fmt: skip
+def test_wrong_maps_of_the_ground_are_named(tmp_path, option, values, message):
+    _, rupture = strength()
+    with pytest.raises(mpm.InputError, match=message):
+        strength(option, map_of(tmp_path / "m.asc", rupture, values))
+
+
+def test_a_map_of_coefficients_is_doubted(tmp_path):
+    _, rupture = strength()
+    with pytest.warns(RuntimeWarning, match="--friction-map has values up to 0.4 only, which are angles in degrees"):
+        strength("--friction-map", map_of(tmp_path / "m.asc", rupture, (0.2, 0.4)))
+
+
+@pytest.mark.parametrize("text, message", [
+    ("house,10,0\nmill,5", "line 2 of .* is 'mill,5', expected a name, x and y in metres"),
+    ("house,10,0\nhouse,5,1", "line 2 of .* has the name 'house' again"),
+    ("name,x,y\nhouse,1e4,0", "'house' is at x 10000 m, y 0 m, expected a place on the ground"),
+    ("name,x,y\n", "has no places, expected a name, x and y"),
+    ("name,x,y\nhouse,a,b", "line 2 of .* is 'house,a,b', expected"),
+])  # fmt: skip
+def test_wrong_places_are_named(tmp_path, text, message):
+    (tmp_path / "places.csv").write_text(text)
+    _, rupture = strength()
+    with pytest.raises(mpm.InputError, match=message):
+        importlib.import_module("common.runout_places").read_places(tmp_path / "places.csv", rupture)
+
+
+def box_file(path, lower, upper, sides=6):
+    """A box as an STL file, the last sides left out."""
+    corners = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)])
+    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)][:sides]
+    triangles = [corner for a, b, c, d in quads for corner in ((a, b, c), (a, c, d))]
+    points = np.asarray(lower) + corners * (np.asarray(upper) - lower)
+    meshio.write(path, meshio.Mesh(points, [("triangle", np.array(triangles))]))
+    return path
+
+
+SMALL = "--height 20 --thickness 4 --cell-size 4 --spacing 2 --headroom 8 --time 6 --frames 12 --no-film --ground-friction-angle 10"
+
+
+def test_places_and_structures_are_followed(tmp_path):
+    """A dam across the channel stops the slide: it takes the horizontal momentum, and one place is reached, the other is not."""
+    (tmp_path / "places.csv").write_text("name,x,y\nabove,20,0\nbelow,60,0\n")
+    dam = box_file(tmp_path / "dam.stl", (32.0, -21.0, -10.0), (44.0, 21.0, 17.0))
+    folder = tmp_path / "there"
+    options = f"{SMALL} --places {tmp_path / 'places.csv'} --structure {dam} --output {folder}"
+    run = ended("runout", folder, *options.split())
+    assert run.returncode == 0, run.stderr
+    history = np.genfromtxt(folder / "history.csv", delimiter=",", names=True, deletechars="")
+    above, below = history["thickness_above_m"], history["thickness_below_m"]
+    assert above[0] == 0 and above.max() > 0.5 and not below.any() and not history["speed_below_m_per_s"].any()
+    force = history["force_dam_x_N"]
+    assert force[0] == 0 and force.max() > 0
+    assert abs(history["force_dam_y_N"]).max() < 0.2 * force.max()  # the valley is symmetric
+    assert {"places.png", "structures.png", "most.png"} <= {path.name for path in folder.iterdir()}
+    assert "dam" in (folder / "summary.json").read_text()
+
+
+def test_an_open_structure_and_two_of_one_name_are_refused(tmp_path):
+    structures = importlib.import_module("common.runout_structures")
+    with pytest.raises(mpm.InputError, match="hole|has a border, expected a closed surface"):
+        structures.read_structures([box_file(tmp_path / "dam.stl", (0, 0, 0), (1, 1, 1), sides=3)])
+    (tmp_path / "b").mkdir()
+    twice = [box_file(folder / "wall.stl", (0, 0, 0), (1, 1, 1)) for folder in (tmp_path, tmp_path / "b")]
+    with pytest.raises(mpm.InputError, match="--structure names two files wall"):
+        structures.read_structures(twice)
+
+
+@pytest.mark.parametrize("words, message", [
+    ("--material cam-clay", "--material is cam-clay, expected a law that can begin without stress"),
+    ("--dilation-angle 40", "--dilation-angle is 40 degrees, expected at most --friction-angle, 28 degrees"),
+    ("--friction-map no.asc", "--friction-map is no.asc, but there is no such file"),
+    ("--structure-friction-angle 20", "--structure-friction-angle is given, expected --structure with it"),
+])  # fmt: skip
+def test_wrong_options_are_named(capfd, words, message):
+    with pytest.raises(SystemExit):
+        importlib.import_module("runout").parse(words.split())
+    assert message in capfd.readouterr().err
+
+
+def test_a_slide_that_leaves_its_mesh_says_so(tmp_path):
+    """On smooth, steep ground it is gone after some seconds; the run ends with its results."""
+    from fenics_bridge import terrain
+
+    x, y = np.arange(0.0, 81.0, 4.0), np.arange(0.0, 61.0, 4.0)
+    u, v = np.meshgrid(x, y)
+    plane = -1.0 * u
+    cap = 4 * np.maximum(1 - ((u - 20) / 12) ** 2 - ((v - 30) / 12) ** 2, 0)
+    for name, values in (("a", plane + cap), ("b", plane)):
+        terrain.write_raster(tmp_path / f"{name}.asc", terrain.Raster(x, y, values))
+    files = f"--terrain {tmp_path / 'a.asc'} --rupture {tmp_path / 'b.asc'} --output {tmp_path / 'there'}"
+    rest = "--cell-size 4 --spacing 2 --headroom 8 --ground-friction-angle 0 --frames 20 --time 20 --no-film"
+    run = ended("runout", tmp_path / "there", *files.split(), *rest.split())
+    assert run.returncode == 1 and "all of the slide has left the mesh by" in run.stderr, run.stderr
+    assert "100% of its mass left the mesh at its sides" in run.stdout and (tmp_path / "there" / "most.png").exists()
