@@ -9,6 +9,7 @@ import numpy as np
 from dolfinx.mesh import meshtags
 from mpi4py import MPI
 from mpm_core.mesh import cell_sizes
+from mpm_core.motion import says_its_unit
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -40,23 +41,25 @@ def outcrop_motion(a: Namespace) -> tuple[np.ndarray, np.ndarray, mpm.Motion]:
             (0.5 * a.frequency, a.highest_frequency), a.peak, a.duration, STEP, a.seed
         )
     largest = float(np.abs(acceleration).max())
-    where = f"--unit is {a.unit}" if a.accelerogram is not None else "--peak"
+    where = "the unit of --accelerogram (--unit)" if a.accelerogram is not None else "--peak"
     say(f"the largest acceleration of the outcrop is {largest:.3g} m/s2, more than any that was recorded in rock: check {where}"
         if largest > LARGEST_RECORDED else "")  # fmt: skip
     return time, acceleration, as_motion(time, acceleration)
 
 
 def recorded(a: Namespace) -> tuple[np.ndarray, np.ndarray]:
-    """Times from the first on [s] and accelerations [m/s2] in the file of ``--accelerogram``."""
+    """Times from the first on [s] and accelerations [m/s2] in the file of ``--accelerogram``.
+
+    Without ``--unit`` they are in that of a PEER file, or in m/s2.
+    """
     path = a.accelerogram
     if not any(line.split("#")[0].strip() for line in path.read_text(errors="replace").splitlines()):
         raise mpm.InputError(f"--accelerogram {path} is empty")
     try:
-        time, acceleration = mpm.read_acceleration(path, unit=a.unit)
+        unit = a.unit if a.unit is not None or says_its_unit(path) else "m/s2"
+        time, acceleration = mpm.read_acceleration(path, unit=unit)
     except mpm.InputError as error:
-        raise mpm.InputError(
-            f"--accelerogram: expected two columns: time [s], acceleration [{a.unit}]; {error}"
-        ) from None
+        raise mpm.InputError(f"--accelerogram: {error}") from None
     return time - time[0], acceleration
 
 

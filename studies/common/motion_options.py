@@ -19,8 +19,14 @@ def add_motion_options(p: ArgumentParser) -> None:
     add_number(p, "--rock-speed", 1000.0, "m/s", "speed of shear waves in the rock", above=0)
     add_choice(p, "--motion", "noise", ("noise", "ricker"), "synthetic motion of the outcrop")
     p.add_argument("--accelerogram", type=Path, default=None, metavar="FILE",
-                   help="file of the outcrop's motion, time [s] and acceleration, in place of a synthetic one")  # fmt: skip
-    add_choice(p, "--unit", "m/s2", ("m/s2", "cm/s2", "g"), "unit of the accelerations in that file")
+                   help="file of the outcrop's motion in place of a synthetic one: times [s] and accelerations, or .AT2 of PEER")  # fmt: skip
+    add_choice(
+        p,
+        "--unit",
+        None,
+        ("m/s2", "cm/s2", "g"),
+        "unit of the accelerations in that file (default: that of a PEER file, else m/s2)",
+    )
     add_number(p, "--peak", 4.0, "m/s2", "largest acceleration of a synthetic motion", above=0)
     add_number(
         p,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,9 @@ from .checks import real_numbers
 
 STANDARD_GRAVITY = 9.80665
 """The unit g [m/s2]"""
+
+UNITS = {"m/s2": 1.0, "cm/s2": 0.01, "g": STANDARD_GRAVITY}
+"""Units of accelerations [m/s2]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +68,12 @@ def motion_of_acceleration(time: ArrayLike, acceleration: ArrayLike, *, baseline
     return Motion(times, velocity)
 
 
-def read_accelerogram(path: str | os.PathLike[str], *, unit: str, baseline: int | None = 1) -> Motion:
+def read_accelerogram(path: str | os.PathLike[str], *, unit: str | None = None, baseline: int | None = 1) -> Motion:
     """The motion of a file of `read_acceleration`.
 
     Args:
         path: of the file; all ranks read it.
-        unit: of the acceleration, ``"m/s2"``, ``"cm/s2"`` or ``"g"``.
+        unit: as for `read_acceleration`.
         baseline: as for `motion_of_acceleration`.
 
     Raises:
@@ -78,37 +82,109 @@ def read_accelerogram(path: str | os.PathLike[str], *, unit: str, baseline: int 
     return motion_of_acceleration(*read_acceleration(path, unit=unit), baseline=baseline)
 
 
-def read_acceleration(path: str | os.PathLike[str], *, unit: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times [s] and accelerations [m/s2], (n,) each, of a file with these two columns, divided by blanks or commas.
+def read_acceleration(
+    path: str | os.PathLike[str], *, unit: str | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times [s] and accelerations [m/s2], (n,) each, of a file of two columns, or of the PEER ground motion database (.AT2).
+
+    Columns are divided by blanks, commas or semicolons (between which a comma is a decimal one); ``#`` begins a comment. A file of
+    PEER has its number of values and time step in its header, as NPTS and DT, and then nothing but values.
 
     Args:
-        path: of the file; all ranks read it. ``#`` begins a comment.
-        unit: of the acceleration in the file, ``"m/s2"``, ``"cm/s2"`` or ``"g"``.
+        path: of the file; all ranks read it.
+        unit: of the acceleration in the file, ``"m/s2"``, ``"cm/s2"`` or ``"g"``; a file of PEER says it by itself.
 
     Raises:
-        InputError: an unknown unit, a file that cannot be read or has not two columns of numbers, times that do not rise.
+        InputError: an unknown unit, none for two columns, or another one than a file of PEER says; a file that cannot be read, has not
+            two columns of numbers, or not as many values as its header says; times that do not rise.
     """
-    factors = {"m/s2": 1.0, "cm/s2": 0.01, "g": STANDARD_GRAVITY}
-    if unit not in factors:
-        raise InputError(f"unit is {unit!r}, expected one of {', '.join(map(repr, factors))}")
+    if unit is not None and unit not in UNITS:
+        raise InputError(f"unit is {unit!r}, expected one of {', '.join(map(repr, UNITS))}")
     try:
         with open(path, encoding="utf-8") as file:
-            lines = [line.split("#")[0].replace(",", " ") for line in file]
-        columns = np.loadtxt(lines, ndmin=2)
-    except OSError as error:
+            lines = file.read().splitlines()
+    except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"accelerogram {os.fspath(path)} cannot be read: {error}") from error
-    except ValueError as error:
-        raise InputError(
-            f"accelerogram {os.fspath(path)} cannot be read: {error}; expected lines of a time and an acceleration, divided by "
-            "blanks or a comma, and # before those of a header"
-        ) from error
-    if columns.ndim != 2 or columns.shape[1] != 2:
-        raise InputError(
-            f"accelerogram {os.fspath(path)} has {columns.shape[-1]} columns, expected time and acceleration"
-        )
-    time, acceleration = _column("time", columns[:, 0]), factors[unit] * _column("acceleration", columns[:, 1])
+    if (header := _peer_header(lines)) is not None:
+        time, values, unit = _peer_record(os.fspath(path), lines, header, unit)
+    else:
+        if unit is None:
+            raise InputError(
+                f"unit is None, expected that of accelerogram {os.fspath(path)}: {', '.join(map(repr, UNITS))}"
+            )
+        time, values = _two_columns(os.fspath(path), lines)
+    time, acceleration = _column("time", time), UNITS[unit] * _column("acceleration", values)
     _require_series(time, "acceleration", acceleration)
     return time, acceleration
+
+
+def _two_columns(path: str, lines: list[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times and values of a file with one of each in a line."""
+    texts = [line.split("#")[0] for line in lines]
+    texts = [text.replace(",", ".").replace(";", " ") if ";" in text else text.replace(",", " ") for text in texts]
+    try:
+        columns = np.loadtxt(texts, ndmin=2)
+    except ValueError as error:
+        raise InputError(
+            f"accelerogram {path} cannot be read: {error}; expected lines of a time and an acceleration, divided by "
+            "blanks or a comma, and # before those of a header, or a file of the PEER ground motion database"
+        ) from error
+    if columns.ndim != 2 or columns.shape[1] != 2:
+        raise InputError(f"accelerogram {path} has {columns.shape[-1]} columns, expected time and acceleration")
+    return columns[:, 0], columns[:, 1]
+
+
+_NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
+_HEADERS = (
+    re.compile(rf"NPTS\s*=\s*(\d+)\D.*?DT\s*=\s*({_NUMBER})", re.IGNORECASE),
+    re.compile(rf"(\d+)\s+({_NUMBER})\s+NPTS\s*,\s*DT", re.IGNORECASE),
+)
+"""The last line of the header of a PEER file: NPTS=  5000, DT=   .0100 SEC; older files have 5000  0.0100  NPTS, DT"""
+_HEADER_LINES = 10
+_IN_G = re.compile(r"UNITS OF G\b|\(G'?S?\)|\bIN G\b", re.IGNORECASE)
+
+
+def says_its_unit(path: str | os.PathLike[str]) -> bool:
+    """Whether an accelerogram is a PEER file whose header has the unit of the accelerations; False where it cannot be read."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            lines = [line for line, _ in zip(file, range(_HEADER_LINES))]
+    except (OSError, UnicodeDecodeError):
+        return False
+    return _peer_header(lines) is not None and any(_IN_G.search(line) for line in lines)
+
+
+def _peer_header(lines: list[str]) -> tuple[int, int, float] | None:
+    """Number of the last line of the header of a PEER file, its number of values, and its time step [s]; None for other files."""
+    for number, line in enumerate(lines[:_HEADER_LINES]):
+        for pattern in _HEADERS:
+            if found := pattern.search(line):
+                return number, int(found[1]), float(found[2])
+    return None
+
+
+def _peer_record(
+    path: str, lines: list[str], header: tuple[int, int, float], unit: str | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
+    """Times, values and unit of a PEER file."""
+    last, count, step = header
+    said = " ".join(lines[:last]).upper()
+    if "VELOCITY" in said or "DISPLACEMENT" in said:
+        raise InputError(
+            f"accelerogram {path} has velocities or displacements by its header, expected accelerations (.AT2)"
+        )
+    own = "g" if _IN_G.search(said) else unit
+    if own is None:
+        raise InputError(f"unit is None, expected that of accelerogram {path}, whose header does not name it")
+    if unit not in (None, own):
+        raise InputError(f"unit is {unit!r}, expected {own!r} as the header of accelerogram {path} says")
+    try:
+        values = np.array(" ".join(lines[last + 1 :]).split(), dtype=float)
+    except ValueError as error:
+        raise InputError(f"accelerogram {path} cannot be read: {error}") from None
+    if len(values) != count:
+        raise InputError(f"accelerogram {path} has {len(values)} values, expected {count} as its header says")
+    return step * np.arange(count), values, own
 
 
 def _column(name: str, values: ArrayLike) -> NDArray[np.float64]:

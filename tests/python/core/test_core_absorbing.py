@@ -243,6 +243,51 @@ def test_an_accelerogram_gives_back_its_motion_whatever_the_unit(tmp_path):
         mpm.read_accelerogram(tmp_path / "nothing", unit="g")
 
 
+PEER = """PEER NGA STRONG MOTION DATABASE RECORD
+Imaginary-01, 1/1/2000, Nowhere, 90
+ACCELERATION TIME SERIES IN UNITS OF G
+{last}
+  .1000000E-01 -.2000000E-01  .3000000E+00  .0000000E+00 -.1000000E+00
+  .5000000E-01  .2000000E-01
+"""
+
+
+@pytest.mark.parametrize(
+    "last", ["NPTS=     7, DT=   .0050 SEC,", "NPTS= 7  DT= 5.0E-03 SEC", "    7    0.0050    NPTS, DT"]
+)
+def test_a_file_of_the_peer_database_is_read(tmp_path, last):
+    path = tmp_path / "RSN1.AT2"
+    path.write_text(PEER.format(last=last))
+    time, acceleration = mpm.read_acceleration(path)
+    np.testing.assert_allclose(time, 0.005 * np.arange(7), rtol=1e-12)
+    np.testing.assert_allclose(acceleration, 9.80665 * np.array([0.01, -0.02, 0.3, 0, -0.1, 0.05, 0.02]), rtol=1e-12)
+    np.testing.assert_array_equal(mpm.read_acceleration(path, unit="g")[1], acceleration)
+
+
+@pytest.mark.parametrize("change, unit, message", [
+    (("NPTS=     7", "NPTS=     8"), None, "has 7 values, expected 8 as its header says"),
+    (("ACCELERATION", "VELOCITY"), None, "has velocities or displacements by its header"),
+    ((".3000000E+00", "*****"), None, "cannot be read: could not convert"),
+    (("IN UNITS OF G", ""), None, "unit is None, expected that of accelerogram .*, whose header does not name it"),
+    (("", ""), "m/s2", "unit is 'm/s2', expected 'g' as the header of accelerogram"),
+])  # fmt: skip
+def test_wrong_files_of_the_peer_database_are_named(tmp_path, change, unit, message):
+    path = tmp_path / "RSN1.AT2"
+    path.write_text(PEER.format(last="NPTS=     7, DT=   .0050 SEC,").replace(*change))
+    with pytest.raises(mpm.InputError, match=message):
+        mpm.read_acceleration(path, unit=unit)
+
+
+def test_columns_divided_by_semicolons_may_have_decimal_commas(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text("# t; a\n0,00;1,5\n0,01;-2,5\n")
+    time, acceleration = mpm.read_acceleration(path, unit="cm/s2")
+    np.testing.assert_allclose(time, [0, 0.01])
+    np.testing.assert_allclose(acceleration, [0.015, -0.025])
+    with pytest.raises(mpm.InputError, match="unit is None, expected that of accelerogram"):
+        mpm.read_acceleration(path)
+
+
 def test_the_baseline_correction_takes_out_an_error_of_the_records_zero():
     # A constant error e of the acceleration is an error e t of the velocity, which lies in the polynomials: the corrected
     # motion does not depend on e.

@@ -138,6 +138,19 @@ def test_a_recorded_motion_keeps_its_high_frequencies(tmp_path):
     np.testing.assert_allclose(motion.velocity, exact, atol=0.01 * abs(exact).max())
 
 
+def test_a_record_without_unit_is_in_that_of_its_file_or_in_si(tmp_path):
+    values = np.sin(np.arange(40.0))
+    np.savetxt(tmp_path / "record.txt", np.column_stack([0.01 * np.arange(40), values]))
+    rows = "\n".join(f"{value:.7E}" for value in values)
+    (tmp_path / "record.AT2").write_text(
+        f"PEER\nEvent\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 40, DT= .01 SEC\n{rows}\n"
+    )
+    for name, factor in (("record.txt", 1.0), ("record.AT2", 9.80665)):
+        time, found, _ = outcrop_motion(Namespace(accelerogram=tmp_path / name, unit=None))
+        np.testing.assert_allclose(found, factor * values, rtol=1e-6)
+        np.testing.assert_allclose(time, 0.01 * np.arange(40), atol=1e-12)
+
+
 @pytest.mark.parametrize("first", [-20.0, 100.0])
 def test_a_recorded_motion_begins_with_the_run_whatever_its_first_time(tmp_path, first):
     """Records count time from midnight, or from the trigger: what lay before 0 was left out, and up to it nothing moved."""
