@@ -6,14 +6,15 @@
 /// the nodes at its place, relative to the surface, the force on it is
 ///
 ///     f = kappa <-(g + dt v_n)> n - kappa s,   kappa = beta m_p / dt_c^2,
-///     |kappa s| <= mu f_n + (a + C rho v_t^2) A_p,
+///     |kappa s| <= mu f_n + (a + C rho v_t^2) A_p (1 - g / r_p),
 ///
-/// with the elastic slip s, to which dt v_t is added before it is returned to the cone of friction, which the velocity
-/// of sliding widens by the turbulent resistance of Voellmy (1955), C = g / xi. Since
-/// sum kappa_p N_i N_j <= beta / dt_c^2 M_ij and M_ij is below the lumped masses, contact has no frequency above
-/// sqrt(beta) / dt_c, whatever the soil and the mesh; and with the gap and the slip at the end of the step, the nodes
-/// never get more work from it than its springs give up, as long as beta dt^2 <= dt_c^2. With a body that moves freely
-/// the same holds for dt_c^2 >= (1 + load) dt^2, load = sum m_p (1/M + r_p^2/I) (docs/contact.md).
+/// with the last factor between 0 and 2 (see `covered_part`), and the elastic slip s, to which dt v_t is added before
+/// it is returned to the cone of friction, which the velocity of sliding widens by the turbulent resistance of Voellmy
+/// (1955), C = g / xi. Since sum kappa_p N_i N_j <= beta / dt_c^2 M_ij and M_ij is below the lumped masses, contact has
+/// no frequency above sqrt(beta) / dt_c, whatever the soil and the mesh; and with the gap and the slip at the end of
+/// the step, the nodes never get more work from it than its springs give up, as long as beta dt^2 <= dt_c^2. With a
+/// body that moves freely the same holds for dt_c^2 >= (1 + load) dt^2, load = sum m_p (1/M + r_p^2/I)
+/// (docs/contact.md).
 ///
 /// Particles that are tied to a surface have the force -kappa (s + dt v) of all their motion s relative to it.
 

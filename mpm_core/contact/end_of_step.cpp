@@ -11,7 +11,7 @@ namespace
 {
 constexpr double relative_stiffness = 50;  ///< of a spring with beta = 1 to its particle
 constexpr double smoothing = 1e-5;         ///< of the onset of contact, over the radius of a particle
-constexpr double farthest = 30;            ///< gap, over that length, beyond which there is no force any more
+constexpr double farthest = 30;            ///< gap, over that length, beyond which there is no normal force any more
 constexpr double difference_length = 1e-6; ///< for derivatives of the normal, over the radius of a particle
 
 template <int D>
@@ -127,12 +127,12 @@ template <int D>
 LongestSlip longest_slip(const Resistance& strength, const Spring& spring, const WaterShare& water, double overlap,
                          const EndTouch<D>& touch)
 {
-  const double adheres = 1 / (1 + std::exp(-(overlap + farthest / 2) / 2)); // from nearly 0 at `farthest` to 1
-  const double rises = 1 / (1 + std::exp(-overlap));                        // d depth / d overlap
-  const double stuck = strength.adhesion * touch.area / spring.shear;       // slip at which adhesion alone gives way
+  const double part = covered_part(spring.radius - overlap * spring.onset, spring.radius);
+  const double rises = 1 / (1 + std::exp(-overlap));                  // d depth / d overlap
+  const double stuck = strength.adhesion * touch.area / spring.shear; // slip at which adhesion alone gives way
   const double per_depth = strength.friction * spring.stiffness / spring.shear, grains = carried_by_grains(water);
-  return {per_depth * grains * touch.depth + stuck * adheres,
-          per_depth * grains * rises + stuck * adheres * (1 - adheres) / (2 * spring.onset),
+  return {per_depth * grains * touch.depth + stuck * part,
+          per_depth * grains * rises + (part > 0 && part < 2 ? stuck / spring.radius : 0),
           grains > 0 ? -per_depth * touch.depth * water.per_pressure : 0};
 }
 
@@ -200,7 +200,11 @@ Spring spring_of(const Particles<G::dim>& particles, Index p, const ContactModul
 {
   const double radius = particle_radius<G>(particles, p), area = particle_area<G>(particles, p, radius, 0);
   const double per_modulus = relative_stiffness * penalty * area / (2 * radius);
-  return {smoothing * radius, area, G::has_hoop ? -2 * radius * radius : 0, per_modulus * moduli.compression,
+  return {radius,
+          smoothing * radius,
+          area,
+          G::has_hoop ? -2 * radius * radius : 0,
+          per_modulus * moduli.compression,
           per_modulus * moduli.shear};
 }
 
@@ -237,14 +241,18 @@ bool touches_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spring&
   touch.normal = normal;
   touch.area = area_at<D>(spring, normal);
   const double overlap = (radius - apart) / spring.onset;
-  if (overlap < -farthest)
+  const Resistance& strength = resistance_at(contact, part);
+  touch.presses = overlap >= -farthest;
+  const double covers = covered_part(spring.radius - overlap * spring.onset, spring.radius);
+  if (!touch.presses && !(strength.adhesion > 0 && covers > 0))
     return false;
+  touch.covered = touch.area * (strength.adhesion > 0 ? covers : 1);
   touch.depth = spring.onset * (std::max(overlap, 0.0) + std::log1p(std::exp(-std::abs(overlap))));
   for (int i = 0; i < D; ++i)
     touch.arm[i] = place[i] - apart * normal[i] - end.displacement[i] - end.centre[i];
   const Relative<D> relative = relative_motion<D>(contact.body, end, u, touch.arm);
   const bool rough = !contact.slip.empty();
-  const LongestSlip longest = longest_slip<D>(resistance_at(contact, part), spring, water, overlap, touch);
+  const LongestSlip longest = longest_slip<D>(strength, spring, water, overlap, touch);
   touch.slip = rough ? old : Vector<D>{};
   if (rough)
     touch.sticks = update_slip<D>(normal, relative.motion, longest.value, touch.slip);
@@ -280,7 +288,7 @@ EndTouch<D> tied_at_end(SeenSurface<D>& seen, const RigidBody<D>& end, const Spr
   for (int i = 0; i < D; ++i)
     place[i] = x[i] + u[i];
   touch.normal = distance_at<D>(seen, end, place).normal;
-  touch.area = area_at<D>(spring, touch.normal);
+  touch.area = touch.covered = area_at<D>(spring, touch.normal);
   for (int i = 0; i < D; ++i)
   {
     touch.arm[i] = place[i] - end.displacement[i] - end.centre[i];

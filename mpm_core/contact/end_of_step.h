@@ -5,9 +5,9 @@
 /// A particle moves by u, the body to its place at the step's end. There its gap g, the normal n and the motion w of
 /// the particle relative to the body give
 ///
-///     f = kappa <-g> n - kappa_t s,   |kappa_t s| <= mu b kappa <-g> + a A_p h,   <-g> = d ln(1 + exp(-g / d)),
-///     kappa = 50 beta M A_p / (2 r_p),   kappa_t = 50 beta G A_p / (2 r_p),   d = 1e-5 r_p,
-///     h = 1 / (1 + exp((g / d - 15) / 2)),
+///     f = kappa <-g> n - kappa_t s,   <-g> = d ln(1 + exp(-g / d)),   d = 1e-5 r_p,
+///     |kappa_t s| <= mu b kappa <-g> + a A_p (1 - g / r_p),
+///     kappa = 50 beta M A_p / (2 r_p),   kappa_t = 50 beta G A_p / (2 r_p),
 ///
 /// with the part b of the normal force that the grains carry, 1 without water, and the moduli M of compression without
 /// lateral strain and G of shear of the soil in the cell, at least twenty times the pore pressure, and the slip
@@ -59,6 +59,7 @@ struct ContactModuli
 /// The springs between a particle and a surface.
 struct Spring
 {
+  double radius;    ///< of the particle at the step's start [m]
   double onset;     ///< d [m]
   double area;      ///< that it covers of a surface as far from the axis as itself [m2]
   double by_normal; ///< derivative of the area by the normal's component away from the axis, in axial symmetry
@@ -99,7 +100,9 @@ struct EndTouch
   Vector<D> arm{};       ///< from the body's centre to the nearest point of its surface, or to a tied particle [m]
   Vector<D> normal{};    ///< of the surface there
   double depth = 0;      ///< [m]
-  double area = 0;       ///< of the surface that the particle covers [m2]
+  double area = 0;       ///< of the particle at the surface [m2]
+  double covered = 0;    ///< part of the surface on which it resists sliding, see `covered_part` [m2]
+  bool presses = true;   ///< whether it touches; otherwise it is near, and only its adhesion acts
   bool sticks = true;
 };
 

@@ -174,30 +174,31 @@ std::optional<ParticleForce<D>> particle_force(const Press<D>& press, const Dist
   ParticleForce<D> found{{}, {}, 0, touch.normal};
   for (double& component : found.facing)
     component *= area;
-  if (!(depth > 0))
+  const Resistance& strength = resistance_at(contact, nearest.part);
+  const double cohesive = strength.adhesion + turbulent_stress(strength, press, touch, particles, p); // [Pa]
+  const double covered = area * (cohesive > 0 ? covered_part(touch.after, radius) : depth > 0 ? 1 : 0);
+  if (!(depth > 0) && !(cohesive > 0))
   {
     leave_slip<D>(press, p);
     return water ? std::optional(found) : std::nullopt;
   }
-  reaction.area += area;
-  reaction.mass += mass;
-  reaction.normal += stiffness * depth;
-  const WaterShare share{water ? water->fraction(particles.cell[p], touch.normal) : 0};
+  const double pressed = std::max(depth, 0.0);
+  reaction.area += covered;
+  reaction.mass += depth > 0 ? mass : 0;
+  reaction.normal += stiffness * pressed;
+  const WaterShare share{water && depth > 0 ? water->fraction(particles.cell[p], touch.normal) : 0};
   if (press.slips)
   {
-    const Resistance& strength = resistance_at(contact, nearest.part);
-    const double longest =
-        strength.friction * carried_by_grains(share) * depth +
-        (strength.adhesion + turbulent_stress(strength, press, touch, particles, p)) * area / stiffness;
-    reaction.sticking += update_slip<D>(touch.normal, touch.motion, longest, slip) ? area : 0;
+    const double longest = strength.friction * carried_by_grains(share) * pressed + cohesive * covered / stiffness;
+    reaction.sticking += update_slip<D>(touch.normal, touch.motion, longest, slip) ? covered : 0;
     for (std::size_t i = 0; i < D; ++i)
       (*press.slips)[i][p] = slip[i];
   }
   found.water_fraction = share.fraction;
   for (int i = 0; i < D; ++i)
   {
-    found.normal[i] = stiffness * depth * touch.normal[i];
-    found.force[i] = stiffness * (depth * touch.normal[i] - slip[i]);
+    found.normal[i] = stiffness * pressed * touch.normal[i];
+    found.force[i] = stiffness * (pressed * touch.normal[i] - slip[i]);
   }
   react<D>(found.force, touch.arm, reaction);
   return found;

@@ -28,6 +28,14 @@ double particle_area(const Particles<G::dim>& particles, Index p, double radius,
     return 2 * radius * (G::has_hoop ? particles.position[0][p] - radius * normal_r : 1);
 }
 
+/// Area of the surface on which the strength of a particle's soil acts that does not depend on pressure, over the area
+/// of the particle: 1 where it just touches, 2 where its centre is on the surface, 0 from twice its radius on.
+///
+/// Soil that lies on a surface fills the space up to it, but its particles, in layers at different heights, do not all
+/// touch: the areas of those that do are 0.5 to 0.85 of the surface. With the weights (2 - d / r) / (2 r) over the
+/// distance d, whose integral is 1, the volumes of all that are near sum up to the area, whatever their heights.
+inline double covered_part(double distance, double radius) { return std::clamp(2 - distance / radius, 0.0, 2.0); }
+
 /// Whether a cube with this side is smaller: compared by volumes, since roots take their time.
 template <int D>
 bool fits(double side, double volume)

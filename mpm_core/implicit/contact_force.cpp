@@ -97,6 +97,8 @@ std::vector<PressedNode<D>> pressed_nodes(const Model<G>& model, const TrialCont
   for (const TouchingParticle<D>& at_surface : trial.touching)
   {
     const EndTouch<D>& touch = at_surface.touch;
+    if (!touch.presses)
+      continue;
     const auto weights =
         weights_at<D>(model.mesh.shapes[at_surface.cell], at<D>(model.particles.position, at_surface.particle));
     for (int k = 0; k <= D; ++k)
@@ -299,13 +301,13 @@ void keep_slip(Model<G>& model, const ImplicitStep<G>& step)
     {
       for (std::size_t i = 0; slips && i < D; ++i)
         (*slips)[i][p] = touch.slip[i];
-      if (contact.bond.empty() && !(touch.depth > 0))
+      if (contact.bond.empty() && !(touch.depth > 0) && touch.slip == Vector<D>{})
         continue;
       react<D>(touch.force, touch.arm, reaction);
       reaction.normal += dot<D>(touch.force, touch.normal);
-      reaction.area += touch.area;
-      reaction.sticking += (slips || !contact.bond.empty()) && touch.sticks ? touch.area : 0;
-      reaction.mass += model.particles.mass[p];
+      reaction.area += touch.covered;
+      reaction.sticking += (slips || !contact.bond.empty()) && touch.sticks ? touch.covered : 0;
+      reaction.mass += touch.presses ? model.particles.mass[p] : 0;
       const double slips_by = contact.bond.empty() ? spring.shear : spring.stiffness;
       reaction.energy +=
           0.5 * (spring.stiffness * touch.depth * touch.depth + slips_by * dot<D>(touch.slip, touch.slip));

@@ -27,7 +27,7 @@ GROUPS = {
     "Closed forms": ("column", "bar", "incline", "thick_cylinder", "manufactured", "finite_column", "elastica",
                      "ground_water", "coupled_consolidation", "wet_ground", "undrained_footing", "liakopoulos", "two_phase",
                      "far_field", "impact"),  # fmt: skip
-    "Contact": ("contact_slope",),
+    "Contact": ("contact_slope", "voellmy"),
     "Earthquakes": ("newmark_block",),
     "Axial symmetry": (
         "axisymmetric_cylinder",

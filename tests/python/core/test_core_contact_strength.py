@@ -151,6 +151,46 @@ def test_implicit_steps_know_the_friction_of_segments():
     assert path(0.0) > path(0.4) + 0.2
 
 
+@pytest.mark.parametrize("scheme", ["explicit", "implicit"])
+@pytest.mark.parametrize("per_cell", [3, 6, 12])
+def test_adhesion_acts_on_all_of_the_surface_wherever_particles_lie(scheme, per_cell):
+    # A block on a plate that moves along: its particles are in rows of other heights than the plate, and those that touch it have 0.8
+    # of its length. The block is held at one end, so that adhesion acts on all of it.
+    model = mpm.Model(box((16, 4), (4.0, 1.0), diagonals="alternating", body=((1, 0), (3, 0.5))), SAND)
+    model.seed(density=1000.0, per_cell=per_cell, cell_tag=1)
+    plate = mpm.Plane((0.0, model.gap(mpm.Plane((0.0, 0.0), (0.0, 1.0))) - 1e-9), (0.0, 1.0))
+    adhesion, length = 200.0, 2.0
+    model.set_gravity((0.0, -G))
+    end = mpm.Plane((3.0, 0.0), (-1.0, 0.0))
+    model.add_contact(mpm.Plane((3.0 - model.gap(end) + 1e-9, 0.0), (-1.0, 0.0)))
+    ground = model.add_contact(plate, adhesion=adhesion, velocity=(0.05, 0.0))
+    if scheme == "explicit":
+        list(model.explicit(0.2, damping=0.3))
+        before = ground.impulse[0]
+        list(model.explicit(0.4, damping=0.3))
+        force = (ground.impulse[0] - before) / 0.2
+    else:
+        list(model.implicit(0.4, dt=0.1, quasi_static=True))
+        force = ground.force[0]
+    # The lowest particles reach below the soil, so that a gap is left under it, which the stiff springs of implicit steps do not close.
+    error = 0.12 if scheme == "implicit" else {3: 0.09, 6: 0.04, 12: 0.03}[per_cell]
+    assert -force == pytest.approx(adhesion * length, rel=error)
+    assert ground.area == pytest.approx(length, rel=error)
+
+
+def test_adhesion_ends_where_soil_leaves_the_surface():
+    # Lifted by its particles' radius it is gone; in between its strength falls with the distance.
+    found = []
+    for lifted in (0.0, 0.5, 1.01):
+        model, plane, _ = block()
+        radius = 1 / 32
+        model.place(model.particles.position + (0.0, lifted * radius))
+        ground = model.add_contact(plane, adhesion=500.0, velocity=(0.5, 0.0))
+        list(model.explicit(2e-3))
+        found.append(-ground.force[0] / 500.0)  # over a length of 1 m
+    assert found[1] == pytest.approx(0.5, abs=0.02) and found[2] == 0.0 and found[0] == pytest.approx(1.0, abs=0.02)
+
+
 @pytest.mark.parametrize(
     "surface, values, message",
     [
