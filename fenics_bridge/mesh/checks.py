@@ -44,7 +44,7 @@ def check_conforming(points: NDArray[np.float64], cells: NDArray[np.integer], na
 
     Each facet of one cell alone is a boundary. No node of the boundary may lie on such a facet away from its corners, nearer
     than a millionth of its size, nor may two such facets overlap, as two halves of a square that are cut along different
-    diagonals do.
+    diagonals do. Nor may a node of the boundary lie within a cell, as where two soils fill the same place.
 
     Args:
         points: coordinates of the nodes [m], shape (n, D).
@@ -56,6 +56,12 @@ def check_conforming(points: NDArray[np.float64], cells: NDArray[np.integer], na
     """
     facets = _boundary_facets(cells)
     nodes = np.unique(facets)
+    on = _point_in_cell(points[nodes], points, cells)
+    if on is not None:
+        raise InputError(
+            f"{name}: the node at {_place(points[nodes[on]])} lies within a cell; two parts of the mesh fill the same place there: "
+            "in gmsh cut surfaces or volumes that overlap by Coherence or BooleanFragments, and give each piece to one soil"
+        )
     on = _point_on_facet(points[nodes], nodes, points, facets)
     kind = "a side" if cells.shape[1] == 3 else "a face"
     if on is not None:
@@ -131,6 +137,24 @@ def _lies_on(corners: NDArray[np.float64], size: NDArray[np.float64], places: ND
     distance = np.linalg.norm(offset - (weights[:, :, None] * edges).sum(axis=1), axis=1)
     inside = (weights > -NEAR).all(axis=1) & (weights.sum(axis=1) < 1 + NEAR)
     return ~flat & inside & (distance < NEAR * size)
+
+
+def _point_in_cell(places: NDArray[np.float64], points: NDArray[np.float64], cells: NDArray[np.integer]) -> int | None:
+    """Row of the first of some places (n, D) within a cell, away from its sides or faces; None if none is."""
+    corners = points[cells]
+    centres, edges = corners.mean(axis=1), corners[:, 1:] - corners[:, :1]
+    size = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1)
+    first = len(places)
+    for cell, place in _near_pairs(centres, size, places):
+        near = np.linalg.norm(places[place] - centres[cell], axis=1) < size[cell]
+        cell, place = cell[near], place[near]
+        offset = places[place] - corners[cell, 0]
+        flat = abs(np.linalg.det(edges[cell])) <= NEAR * size[cell] ** edges.shape[1]  # of no area or volume
+        sides = np.where(flat[:, None, None], np.eye(edges.shape[1]), edges[cell])
+        weights = np.linalg.solve(sides.transpose(0, 2, 1), offset[:, :, None])[:, :, 0]
+        inside = ~flat & (weights > NEAR).all(axis=1) & (weights.sum(axis=1) < 1 - NEAR)
+        first = min(first, place[inside].min(initial=first))
+    return first if first < len(places) else None
 
 
 def _near_pairs(centres: NDArray[np.float64], size: float, places: NDArray[np.float64]) -> Iterator[Any]:

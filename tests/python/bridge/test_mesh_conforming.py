@@ -104,6 +104,46 @@ def test_a_torn_mesh_of_tetrahedra_is_refused_on_reading(tmp_path):
         bridge.read_mesh(path, MPI.COMM_SELF, dim=3)
 
 
+# --- parts that fill the same place ----------------------------------------------------------------------------------
+
+SQUARES = """
+SetFactory("OpenCASCADE");
+Rectangle(1) = {0, 0, 0, 6, 3};
+Rectangle(2) = {0, BOTTOM, 0, 3, 2};
+COHERENCE
+Physical Surface("ground") = {1};
+Physical Surface("bank") = {2};
+Mesh.MeshSizeMax = 0.7;
+"""
+
+
+@pytest.mark.parametrize(("bottom", "coherence", "refused"), [(2.3, "", True), (3, "Coherence;", False)])
+def test_soils_that_overlap_are_refused(tmp_path, bottom, coherence, refused):
+    path = tmp_path / "soils.geo"
+    path.write_text(SQUARES.replace("BOTTOM", str(bottom)).replace("COHERENCE", coherence))
+    if refused:
+        with pytest.raises(
+            bridge.InputError, match=r"soils.geo.*lies within a cell; two parts of the mesh fill the same place"
+        ):
+            bridge.read_mesh(path, MPI.COMM_SELF)
+    else:
+        bridge.read_mesh(path, MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, 2.5])
+@pytest.mark.parametrize("depth", [0.01, 0.5])
+def test_a_corner_within_another_tetrahedron_is_refused(depth, angle):
+    corner = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
+    other = np.array([0.3, 0.3, 0.4 - depth * 0.4]) + np.vstack(
+        [np.zeros(3), np.array([(1, 2, 2), (2, 1, 2), (2, 2, 1)])]
+    )
+    cells, points = np.array([(0, 1, 2, 3), (4, 5, 6, 7)]), np.vstack([corner, other])
+    with pytest.raises(bridge.InputError, match="lies within a cell"):
+        check_conforming(turned_in_space(points, angle), cells, "mesh")
+    points[4:] += 0.4 * depth + 0.01  # beyond the face of the first
+    check_conforming(turned_in_space(points, angle), cells, "mesh")
+
+
 # --- tags ------------------------------------------------------------------------------------------------------------
 
 
