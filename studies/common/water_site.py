@@ -50,9 +50,19 @@ class WaterSite:
     varies: bool
 
     def seepage(self, degree: int) -> water.Seepage:
-        """The flow, at rest, in elements of a degree. Collective."""
+        """The flow, at rest, in elements of a degree; reservoirs that change load the soil as well. Collective."""
+        standing = any(isinstance(condition, water.Reservoir) for condition in self.boundary)
+        loading = (
+            water.standing_water(self.domain, self.facet_tags, self.boundary) if self.varies and standing else None
+        )
         return water.Seepage(
-            self.domain, self.soils, self.facet_tags, self.boundary, cell_tags=self.cell_tags, degree=degree
+            self.domain,
+            self.soils,
+            self.facet_tags,
+            self.boundary,
+            cell_tags=self.cell_tags,
+            degree=degree,
+            loading=loading,
         )
 
 

@@ -107,6 +107,27 @@ def test_the_history_of_a_drawdown_balances(tmp_path, monkeypatch):
     assert len(list(folder.glob("film.*"))) == 1
 
 
+def test_water_that_falls_over_level_ground_presses_none_out_of_it(tmp_path):
+    """The load falls with the pore pressure, so that effective stresses stay: only compressed water expands, n w / K_w."""
+    import seepage
+
+    lines = ['SetFactory("OpenCASCADE");', "Rectangle(1) = {0, 0, 0, 4, 2};", 'Physical Surface("clay") = {1};',
+             'Physical Curve("top") = {3};', "Mesh.MeshSizeMax = 0.5;"]  # fmt: skip
+    (tmp_path / "ground.geo").write_text("\n".join(lines) + "\n")
+    (tmp_path / "ground.toml").write_text(
+        'mesh = "ground.geo"\n[soils.clay]\nconductivity = 1e-9\nporosity = 0.4\ncompressibility = 1e-7\n'
+        "[boundaries.top]\nreservoir = [[0.0, 7.0], [1.0, 2.0]]\n"
+    )
+    folder = tmp_path / "results"
+    arguments = ["--days", "200", "--frames", "2", "--no-film", "--output", str(folder)]
+    assert seepage.main(["--site", str(tmp_path / "ground.toml"), *arguments]) == 0
+    rows = np.genfromtxt(folder / "history.csv", delimiter=",", names=True)
+    left = -np.diff(rows["time_days"]) @ rows["inflow_top_m2_per_day"][1:]
+    pressure, area = 9810.0 * 5.0, 4.0 * 2.0
+    assert 0 <= left < 0.01 * 1e-7 * pressure * area  # m_v w would leave if the skeleton took the load
+    assert left == pytest.approx(0.4 / 2.2e9 * pressure * area, rel=0.15)
+
+
 def test_no_film_writes_none(tmp_path):
     import seepage
 
