@@ -203,16 +203,24 @@ def follow(a: Namespace, site: ConsolidationSite, model: water.Consolidation, fi
                 return f"particles from {model.time / DAY:.4g} days on: {error}"
             if not reports[-1].converged:
                 files.frame()  # where the settlements and excess pressures are that it fails with
-                return (
-                    f"no equilibrium was found from {model.time / DAY:.4g} days on, as where ground fails under its load: "
-                    f"{reports[-1].reason}"
-                )
+                return without_equilibrium(site, model.time, reports[-1].reason)
             dt = first if time in changes else max(dt, max(report.dt for report in reports))
             if time in frames:
                 files.frame()
             if time in changes:
                 begin_stage(site, model, files, time)
     return None
+
+
+def without_equilibrium(site: ConsolidationSite, time: float, reason: str) -> str:
+    """What is said of a run that ends at a time [s] for a reason of its last step."""
+    said, soils = f"no equilibrium was found from {time / DAY:.4g} days on", site.dilating_little()
+    if reason.startswith("it collapses") or not soils:
+        return f"{said}, as where ground fails under its load: {reason}"
+    return (
+        f"{said}: {reason}. Either the ground fails under its load, or it does not and Newton's method only finds no way, as it may where "
+        f"{' or '.join(map(repr, soils))} yields, whose dilation angle is below its friction angle: compare a run in which they are equal"
+    )
 
 
 def begin_stage(site: ConsolidationSite, model: water.Consolidation, files: Files, time: float) -> None:

@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from mpm_core.law_warnings import with_inner_laws
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -95,6 +96,16 @@ class ConsolidationSite:
         times = [time for table in tables for time, _ in table if time < end] + [end]
         changed = any(value_at(table, time) != value_at(table, 0.0) for table in tables for time in times if time > 0)
         return changed or any(0 < stage.start < end for stage in self.stages)
+
+    def dilating_little(self) -> list[str]:
+        """Soils whose dilation angle is below their friction angle, so that Newton's method may find no equilibrium where they yield."""
+        names = {tag: name for name, tags in bridge.names_of(self.site.cell_tags).items() for tag in tags}
+        angles = {
+            names.get(tag, str(tag)): (getattr(each, "dilation_angle", None), getattr(each, "friction_angle", None))
+            for tag, law in self.site.laws.items()
+            for each in with_inner_laws(law)
+        }
+        return [name for name, (psi, phi) in angles.items() if psi is not None and phi is not None and psi < phi]
 
     def stage_at(self, time: float) -> GroundStage | None:
         """The stage that begins at a time [s], after the beginning; None where none does."""

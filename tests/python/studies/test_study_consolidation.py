@@ -135,6 +135,24 @@ def test_ground_that_fails_right_after_a_frame_is_not_drawn_twice(tmp_path, monk
     assert drawn == [pytest.approx(2.0)]
 
 
+@pytest.mark.parametrize(
+    "dilation, reason, doubted",
+    [(0, "residual 1e-7", True), (25, "residual 1e-7", False), (0, "it collapses: soil would move by 9 m", False)],
+)
+def test_steps_that_end_by_newtons_method_are_not_said_to_be_failure_of_the_ground(dilation, reason, doubted, tmp_path):
+    import consolidation
+    from common.consolidation_site import read_consolidation_site
+
+    path, old = tmp_path / "site.toml", "friction_angle = 25.0"
+    assert old in SITE
+    text = SITE.replace(old, f"{old}\ndilation_angle = {dilation}.0")
+    path.write_text(text.replace('"footing.geo"', f'"{STUDIES.parent}/meshes/footing.geo"'))
+    said = consolidation.without_equilibrium(read_consolidation_site(path, MPI.COMM_SELF, 2.0), 2 * 86400.0, reason)
+    assert said.startswith("no equilibrium was found from 2 days on") and reason in said
+    assert ("where 'soil' yields, whose dilation angle is below its friction angle" in said) == doubted
+    assert ("as where ground fails under its load" in said) != doubted
+
+
 def test_particles_take_no_other_water_than_reservoirs(tmp_path):
     from common.consolidation_site import read_consolidation_site
 
