@@ -15,6 +15,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from common.checks import say
 from common.collapse_runs import CAPTIONS, CollapseRuns, Target, add_flow_options, dilation_angles
 from common.figures import Pictures
 from common.options import add_flag, add_number, check, study_parser
@@ -38,7 +39,7 @@ from common.slope_fem import (
 )
 from common.summary import write_summary
 from mpi4py import MPI
-from mpm_core.law_warnings import keeps_volume
+from mpm_core.law_warnings import keeps_volume, with_inner_laws
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -216,8 +217,46 @@ def critical_slope(a: Namespace) -> dict[str, object]:
 
 
 def site_load(site: Site, model: bridge.QuasiStatic) -> bridge.Load:
-    """Its load, after its stages if it has some. Collective."""
-    return bridge.FemSite(model).place(site.stages) if site.stages else site.load()
+    """Its load, after its stages if it has some. Collective.
+
+    They are placed at once, since the factor hardly depends on stresses before failure. But soil with friction whose water does not
+    drain has the strength of its effective stress when it ceases to drain: stages in which that happens are carried out.
+
+    Raises:
+        RunError: a stage that is carried out has no equilibrium.
+    """
+    if not site.stages:
+        return site.load()
+    stages = bridge.FemSite(model)
+    if not any(keeps_effective_stress(law) for stage in site.stages for law in stage.law.values()):
+        return stages.place(site.stages)
+    try:
+        for _ in bridge.carry_out(stages, site.stages):
+            pass
+    except bridge.StageError as error:
+        raise mpm.RunError(
+            f"there is no equilibrium to find a factor of safety of, which is below 1: {error}"
+        ) from error
+    return model.load
+
+
+def keeps_effective_stress(law: Any) -> bool:
+    """Whether soil of a law has friction but water that does not drain, so that its strength hardly depends on what loads it later."""
+    each = list(with_inner_laws(law))
+    friction = [one.friction_angle for one in each if hasattr(one, "friction_angle")]
+    return any(hasattr(one, "water_modulus") for one in each) and bool(
+        np.max(friction, initial=1.0 - bool(friction)) > 0
+    )
+
+
+def warn_of_undrained_weight(site: Site) -> None:
+    """Warn of soil with friction that is placed undrained, so that its own weight presses on its water only. Collective."""
+    names = [name for name, tags in bridge.names_of(site.cell_tags).items()
+             if any(keeps_effective_stress(site.laws[tag]) for tag in tags if tag in site.laws)]  # fmt: skip
+    if names:
+        say(f"the water of {', '.join(map(repr, names))} bears the weight of this soil, too, which is placed undrained: its friction gives hardly "
+            "any strength. Ground that has drained under its weight has the law of drained soil first, and by `law` of a later stage that of "
+            "undrained soil (docs/howto/stages.md)")  # fmt: skip
 
 
 def slip_line(a: Namespace, factor: float) -> np.ndarray | None:
@@ -252,6 +291,7 @@ def main(arguments: list[str] | None = None) -> int:
 
         def factor(site, model, progress):
             unreduced = site.tags_of(a.unreduced)
+            warn_of_undrained_weight(site)
             load = shaken(site_load(site, model), a.seismic_coefficient, model.domain.geometry.dim)
             return bridge.factor_of_safety(model, load, start=a.start, progress=progress, unreduced=unreduced)
 

@@ -101,7 +101,8 @@ class FemSite:
         """Bring the soils, laws, supports and water after some stages at once, without the stresses of the stages. Collective.
 
         It is for the factor of safety, which hardly depends on the stresses before failure, also of ground that does not carry its
-        weight and in which therefore no stage has an equilibrium.
+        weight and in which therefore no stage has an equilibrium. Soil with friction that does not drain (`mpm.Undrained`) has the
+        strength of its effective stress, and needs `carry_out`.
 
         Args:
             stages: the stages from the beginning on; at least one.

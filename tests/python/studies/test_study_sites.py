@@ -179,6 +179,57 @@ excavate = "upper"
     assert factors[0] == pytest.approx(factors[1], rel=4e-3)  # twice the tolerance of the search
 
 
+FRICTION = "cohesion = 10e3\nfriction_angle = 35.0\nyoung = 5e6\npoisson = 0.3\n"
+CUT = f"""
+mesh = "block.geo"
+cell_size = 0.5
+[soils.lower]
+unit_weight = 18e3
+{FRICTION}
+[soils.upper]
+unit_weight = 18e3
+{FRICTION}
+[laws.undrained]
+{FRICTION}undrained = true
+water_modulus = 2e8
+[[stages]]
+fill = ["lower", "upper"]
+[[stages]]
+law = {{lower = "undrained", upper = "undrained"}}
+"""
+
+
+@pytest.mark.usefixtures("without_pictures")
+@pytest.mark.parametrize("staged", [True, False])
+def test_soil_that_ceases_to_drain_keeps_its_effective_stress(staged, tmp_path):
+    """Another law changes no stress, so that a cut that carries its weight still does: its factor is 1 or more.
+
+    Soil that is placed undrained carries its weight by its water, and has the strength c cos(phi) alone. In the block 2 m high that
+    makes 4 c cos(phi) / (18 kN/m3 * 2 m) = 0.91 by the wedge of 45 degrees, an upper bound.
+    """
+    text = CUT
+    if not staged:
+        text = CUT.partition("[laws.undrained]")[0].replace(
+            FRICTION, FRICTION + "undrained = true\nwater_modulus = 2e8\n"
+        )
+    options = ["--site", site_in(tmp_path, text), "--meshes", 1, "--output", tmp_path / "out"]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        assert importlib.import_module("safety").main([str(word) for word in options]) == 0
+    said = [str(one.message) for one in caught]
+    assert any("the water of 'lower', 'upper' bears the weight of this soil, too" in text for text in said) != staged
+    factor = json.loads((tmp_path / "out" / "summary.json").read_text())["factor_of_safety"]
+    assert factor >= 1.0 if staged else factor < 0.91 * 1.15  # coarse cells
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_a_stage_without_equilibrium_has_no_factor_of_safety(tmp_path):
+    text = CUT.replace("unit_weight = 18e3", "unit_weight = 60e3")
+    options = ["--site", site_in(tmp_path, text), "--meshes", 1, "--output", tmp_path / "out"]
+    with pytest.raises(mpm.RunError, match="no equilibrium to find a factor of safety of, which is below 1: .*stage 1"):
+        importlib.import_module("safety").main([str(word) for word in options])
+
+
 def test_stages_are_placed_at_once_on_a_new_site_only(tmp_path):
     site = site_file.read_site(site_in(tmp_path, SITE + STAGES), MPI.COMM_WORLD)
     once = bridge.FemSite(site.finite_elements(1))
