@@ -22,6 +22,7 @@ from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
 from common.seepage_plots import SATURATION, FlowPicture, dries, few, flow_picture, save_flow, save_flow_film
+from common.site_doubts import warn_of_suction
 from common.site_options import add_site_file
 from common.summary import write_summary
 from common.water_site import DAY, WaterSite, read_water_site, time_in_words
@@ -158,6 +159,7 @@ def main(arguments: list[str] | None = None) -> int:
     names = [c.facet_tag for c in site.boundary]
     flow.solve()
     steady = {name: DAY * flow.inflow(name) for name in names}
+    dry = warn_of_suction(flow, site.soils, site.cell_tags, a.site)
     pictures, stopped = [flow_picture(flow, "Steady flow at the beginning")], None
     film = pictures[:1]
     with Files(flow, names, folder) as files:
@@ -165,6 +167,8 @@ def main(arguments: list[str] | None = None) -> int:
         files.frame()
         if site.varies:
             stopped = follow(a, flow, files, pictures, film)
+            if not dry:
+                warn_of_suction(flow, site.soils, site.cell_tags, a.site)
     summary = {
         "finished_run": stopped is None, "stopped_because": stopped,
         **{f"steady_inflow_{name}_m2_per_day": value for name, value in steady.items()},

@@ -21,7 +21,7 @@ from .lengths import metres
 from .page import Page
 from .quiet import NOT_REACHED, without_warning
 from .results import open_results
-from .site_doubts import ends_of_height
+from .site_doubts import ends_of_height, warn_of_suction
 from .site_slides import CAPTIONS as SLIDE_CAPTIONS
 from .slope_site import SlopeSite, read_slope_site
 from .summary import write_summary
@@ -60,8 +60,11 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
     folder = open_results(a, comm)
     flow = slope.seepage()
     flow.solve()
+    dry = warn_of_suction(flow, slope.porous, slope.body[1], a.site)
     limits = limits_of(a, slope, flow)
     instants, history, stopped = follow(a, slope, flow, folder)
+    if not dry:
+        warn_of_suction(flow, slope.porous, slope.body[1], a.site)
     worst, failed = lowest(instants), failure_time(instants)
     shown = all(found.failed for found in [*limits.values(), *(instant.safety for instant in instants)])
     summary = {

@@ -2,6 +2,7 @@
 
 import json
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +106,32 @@ def test_the_history_of_a_drawdown_balances(tmp_path, monkeypatch):
     assert came == pytest.approx(change, abs=1e-6 * rows["stored_water_m2"][0])
     assert rows["stored_water_m2"][-1] < rows["stored_water_m2"][0]
     assert len(list(folder.glob("film.*"))) == 1
+
+
+@pytest.mark.parametrize("curve, left, said", [("", 10.0, True), ("free_surface = {}", 10.0, False), ("", 12.0, False)])
+def test_soil_that_stays_saturated_far_above_the_water_table_is_said(curve, left, said, tmp_path):
+    """A dam with vertical faces conducts k (h1^2 - h2^2) / 2 L (Dupuit), and more if the soil above the water table conducts, too."""
+    import seepage
+
+    lines = ['SetFactory("OpenCASCADE");', "Rectangle(1) = {0, 0, 0, 16, 12};", 'Physical Surface("sand") = {1};',
+             'Physical Curve("left") = {4};', 'Physical Curve("right") = {2};', "Mesh.MeshSizeMax = 0.8;"]  # fmt: skip
+    (tmp_path / "dam.geo").write_text("\n".join(lines) + "\n")
+    right = 2.0 if left == 10.0 else 12.0
+    (tmp_path / "dam.toml").write_text(
+        f'mesh = "dam.geo"\n[soils.sand]\nconductivity = 1e-5\n{curve}\n'
+        f"[boundaries.left]\nreservoir = {left}\n[boundaries.right]\nreservoir = {right}\n"
+    )
+    folder = tmp_path / "results"
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        assert seepage.main(["--site", str(tmp_path / "dam.toml"), "--no-film", "--output", str(folder)]) == 0
+    assert (
+        any("'sand' is up to" in str(one.message) and "no retention curve" in str(one.message) for one in caught)
+        == said
+    )
+    inflow = json.loads((folder / "summary.json").read_text())["steady_inflow_left_m2_per_day"]
+    dupuit = 86400 * 1e-5 * (left**2 - right**2) / (2 * 16.0)
+    assert inflow > 1.2 * dupuit if said else inflow == pytest.approx(dupuit, rel=0.03, abs=1e-9)
 
 
 def test_water_that_falls_over_level_ground_presses_none_out_of_it(tmp_path):
