@@ -60,7 +60,7 @@ def add_contact(
         dim = model.mesh.dim
         about = checked(surface, dim)[1] if centre is None else floats("centre", centre, (dim,))
         strength = checked_strength(surface, friction=friction, adhesion=adhesion, drag=drag)
-        described_as = described_strength(strength)
+        described_as = described_strength(surface, strength)
         within("penalty", penalty, 0, 1)
         positive("penalty", penalty, "(a ratio)")
         if flag("bonded", bonded) and is_rough(described_as):

@@ -61,15 +61,21 @@ def _shown(value: ArrayLike) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def described_strength(strength: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
-    """Friction, adhesion and drag as checkpoints have them: a number, or the fingerprint of values by part."""
-    return {name: _described(values) for name, values in strength.items()}
+def described_strength(surface: Surface, strength: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
+    """Friction, adhesion and drag as checkpoints have them: a number, or values by part.
+
+    As with the surfaces themselves, those of segments are all there, and of triangles, which may be millions, a fingerprint.
+    """
+    return {name: _described(surface, values) for name, values in strength.items()}
 
 
-def _described(values: NDArray[np.float64]) -> float | dict[str, Any]:
+def _described(surface: Surface, values: NDArray[np.float64]) -> float | dict[str, Any]:
     if values.ndim == 0:
         return float(values)
-    return {"fingerprint": _fingerprint(values), "parts": len(values), "largest": float(values.max())}
+    there = {"parts": len(values), "largest": float(values.max())}
+    if isinstance(surface, Polyline):
+        return {"values": values.tolist(), **there}
+    return {"fingerprint": _fingerprint(values), **there}
 
 
 def _fingerprint(values: NDArray[np.float64]) -> str:
@@ -77,7 +83,7 @@ def _fingerprint(values: NDArray[np.float64]) -> str:
 
 
 def remember_strength(model: Model, strength: dict[str, NDArray[np.float64]]) -> None:
-    """Keep values by part in the model, since checkpoints have their fingerprints only."""
+    """Keep values by part in the model, since checkpoints have fingerprints only of those of triangles."""
     for values in strength.values():
         if values.ndim:
             model._values_of_parts[_fingerprint(values)] = values
@@ -98,10 +104,16 @@ def strength_of(model: Model, entry: dict[str, Any]) -> NDArray[np.float64]:
     columns = []
     for name in UNITS:
         described = entry.get(name, 0.0)  # files of older versions have no drag
-        columns.append(
-            model._values_of_parts[described["fingerprint"]] if isinstance(described, dict) else np.array([described])
-        )
+        columns.append(_values(model, described) if isinstance(described, dict) else np.array([described]))
     return np.stack(np.broadcast_arrays(*columns), axis=1)
+
+
+def _values(model: Model, described: dict[str, Any]) -> NDArray[np.float64]:
+    """The values by part that a checkpoint describes."""
+    if "values" in described:
+        return np.array(described["values"])
+    values: NDArray[np.float64] = model._values_of_parts[described["fingerprint"]]
+    return values
 
 
 def strength_text(entry: dict[str, Any]) -> str:
@@ -121,8 +133,10 @@ def require_strengths(model: Model, contacts: list[dict[str, Any]]) -> None:
     for entry in contacts:
         for name in UNITS:
             described = entry.get(name, 0.0)
-            if isinstance(described, dict) and described["fingerprint"] not in model._values_of_parts:
+            known = not isinstance(described, dict) or "values" in described
+            if not known and described["fingerprint"] not in model._values_of_parts:
                 raise InputError(
                     f"the checkpoint has contact with a {entry['surface']['kind']} whose {name} differs between its {described['parts']} "
-                    "parts by values that the model does not have; add it by model.add_contact before model.restore"
+                    "parts by values that the model does not have; give the model soil and add the contact by model.add_contact "
+                    "before model.restore, which replaces both"
                 )

@@ -139,11 +139,23 @@ _BODY = {
     "start": _is_number, "mass": _is_number, "speed": _is_number, "velocity": _HISTORY, "spin": _HISTORY, "force": _HISTORY,
     "centre": [_is_number], "inertia": [_is_number], "drive": [{0, 1, 2}], "rotates": bool,
 }  # fmt: skip
-_STRENGTH = AnyOf([_is_positive, {"fingerprint": str, "parts": _is_count, "largest": _is_positive}])
+_PARTS = {"parts": _is_count, "largest": _is_positive}
+_STRENGTH = AnyOf([_is_positive, {"fingerprint": str, **_PARTS}, {"values": [_is_positive], **_PARTS}])
 _OLD_CONTACT = {
     "surface": _is_surface, "friction": _STRENGTH, "adhesion": _STRENGTH, "penalty": _is_number, "bonded": bool, "body": _BODY
 }  # fmt: skip
 _CONTACT = AnyOf([{**_OLD_CONTACT, "drag": _STRENGTH}, _OLD_CONTACT])
+
+
+def _is_contact(value: Any) -> bool:
+    """Whether it is a contact with a rigid surface, of a line with a strength for each of its segments, if by segment."""
+    if not _has_shape(value, _CONTACT):
+        return False
+    points, closed = value["surface"].get("points"), value["surface"].get("closed")
+    segments = len(points) - (not closed) if isinstance(points, list) else 0
+    return all(len(one["values"]) == segments for one in value.values() if isinstance(one, dict) and "values" in one)
+
+
 _FIELD_CONTACT = {
     "first": _is_count, "second": _is_count, "friction": _is_number, "adhesion": _is_number, "interface": _is_surface
 }  # fmt: skip
@@ -173,7 +185,7 @@ _ENTRIES: dict[str, tuple[Any, str]] = {
     "prescribed": (dict, "a table"),
     "next_id": (_is_count, "a whole number from 0 on"),
     "added_fields": ([_FIELD], "a list of {name, unit, meaning, components, initial}"),
-    "contacts": ([_CONTACT], "a list of contacts with rigid surfaces"),
+    "contacts": ([_is_contact], "a list of contacts with rigid surfaces"),
     "field_contacts": ([_FIELD_CONTACT], "a list of contacts between velocity fields"),
     "far_field": (AnyOf([_NONE, _is_border]), "null, or forces and displacements of its border"),
     "water": (AnyOf([_NONE, _WATER, _OLD_WATER]), "null, or the properties of the pore water"),

@@ -44,7 +44,7 @@ def require_surfaces(model: Model, surfaces: list[dict[str, Any]]) -> None:
         if surface["kind"] == "Triangles" and surface["fingerprint"] not in model._triangulated:
             raise InputError(
                 f"the checkpoint has contact with a surface of {surface['triangles']} triangles that the model does not have; "
-                "add it by model.add_contact or add_field_contact before model.restore"
+                "give the model soil and add the surface by model.add_contact or add_field_contact before model.restore, which replaces both"
             )
 
 

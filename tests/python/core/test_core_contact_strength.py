@@ -136,6 +136,23 @@ def test_a_checkpoint_needs_the_values_of_the_triangles(tmp_path):
     assert resumed.contacts[0].values() == ground.values()
 
 
+def test_a_checkpoint_has_the_strength_of_segments(tmp_path):
+    # A script that continues has no particles to add contact for: mesh and laws are all that it needs, as docs/howto/restart.md says.
+    ground = mpm.Polyline([(0.0, 0.8 - 1e-12), (2.5, 0.8 - 1e-12), (7.0, 0.8 - 1e-12)])
+    model, _, _ = block()
+    model.set_gravity((1.0, -G))
+    model.add_contact(ground, friction=[0.1, 0.3], adhesion=[0.0, 50.0], drag=[0.0, 0.1])
+    list(model.explicit(0.3))
+    model.save(tmp_path / "there.h5")
+    resumed = mpm.Model(model.mesh, model.laws)
+    resumed.restore(tmp_path / "there.h5")
+    for each in (model, resumed):
+        list(each.explicit(0.9))
+    assert np.array_equal(model.particles.position, resumed.particles.position)
+    assert repr(model.contacts[0]) == repr(resumed.contacts[0])
+    assert model.contacts[0].values() == resumed.contacts[0].values()
+
+
 def test_implicit_steps_know_the_friction_of_segments():
     def path(friction):
         model, _, _ = block()
