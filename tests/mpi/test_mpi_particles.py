@@ -163,6 +163,21 @@ def test_points_are_seeded_whoever_owns_their_cells(comm):
         model.seed_points([[0.5, 0.1], [5.0, 0.1]], [1e-3, 1e-3], density=1000.0)
 
 
+@pytest.mark.parametrize(
+    "distributed", [lambda x, rank: x[rank::2], lambda x, rank: x[: 10 + rank]], ids=["parts", "lengths"]
+)
+def test_points_that_ranks_share_out_are_refused(comm, distributed):
+    # Parts of the same length would be taken row by row, and some soil would be missing without a word.
+    if comm.size == 1:
+        pytest.skip("one rank has all points")
+    model = mpm.Model(block(comm, (0.0, 0.0)).mesh, mpm.LinearElastic(young=1e6, poisson=0.2))
+    points = np.column_stack([np.linspace(0.2, 3.8, 20), np.full(20, 0.15)])
+    own = distributed(points, comm.rank % 2)
+    with pytest.raises(mpm.InputError, match="points are not the same on all ranks, with shape") as raised:
+        model.seed_points(own, np.full(len(own), 1e-3), density=1000.0)
+    assert len(set(comm.allgather(str(raised.value)))) == 1
+
+
 @pytest.mark.parametrize("owners_of", [bands, scattered])
 def test_points_on_sides_between_cells_are_seeded_once(comm, owners_of):
     mesh = spread_box((8, 8), (1.0, 1.0), comm, owners_of)

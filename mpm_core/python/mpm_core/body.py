@@ -13,7 +13,7 @@ from . import _core, partition
 from ._core import Geometry, InputError
 from .absorbing import AbsorbingSides
 from .checks import positive, renamed
-from .collective import collectively
+from .collective import collectively, require_same
 from .far_field import FarFields
 from .mesh import Mesh, Tag, floats
 from .particle_values import ParticleValues
@@ -184,7 +184,8 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
             Number of particles placed, over all ranks.
 
         Raises:
-            InputError: wrong shape, a point outside of the mesh, a volume or density that is not positive.
+            InputError: wrong shape, a point outside of the mesh, a volume or density that is not positive, other points on
+                another rank.
         """
 
         def place() -> int:
@@ -196,8 +197,10 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
             rows = np.flatnonzero(inside.argmax(axis=0) == self.comm.rank)
             return self._core.seed_points(x[rows], v[rows], self._next_id + rows, self._material(material), rho)
 
+        own = collectively(self.comm, lambda: self._owned(points))
+        require_same(self.comm, "points", np.asarray(points))
         # By rank and point: one on a side between the cells of two ranks is in both, and the first rank has it.
-        inside = np.array(self.comm.allgather(collectively(self.comm, lambda: self._owned(points))))
+        inside = np.array(self.comm.allgather(own))
         if not inside.any(axis=0).all():
             first = int(np.argmin(inside.any(axis=0)))
             raise InputError(f"points has {np.asarray(points)[first]} at row {first}, which is outside of the mesh")

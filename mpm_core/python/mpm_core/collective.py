@@ -1,10 +1,13 @@
 """Errors that are raised on all ranks alike."""
 
+import hashlib
 import os
 from collections.abc import Callable
 from typing import TypeVar
 
+import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from ._core import InputError, RunError
 
@@ -87,3 +90,25 @@ def check_same_path(comm: MPI.Comm, path: str | os.PathLike[str]) -> None:
     other = next((rank for rank, one in enumerate(paths) if one != paths[0]), None)
     if other is not None:
         raise InputError(f"path is not the same on all ranks: {paths[0]} on rank 0, {paths[other]} on rank {other}")
+
+
+def require_same(comm: MPI.Comm, name: str, array: NDArray[np.generic]) -> None:
+    """Check that all ranks give the same array, of which each takes its part.
+
+    Args:
+        name: of the argument.
+        array: what it is on this rank.
+
+    Raises:
+        InputError: on all ranks: the arrays differ.
+    """
+    if comm.size == 1:
+        return
+    digest = hashlib.blake2b(np.ascontiguousarray(array).tobytes(), digest_size=16).hexdigest()
+    given = comm.allgather((array.shape, array.dtype.str, digest))
+    other = next((rank for rank, one in enumerate(given) if one != given[0]), None)
+    if other is not None:
+        raise InputError(
+            f"{name} are not the same on all ranks, with shape {given[0][0]} on rank 0 and {given[other][0]} on rank {other}, "
+            "expected all of them on every rank"
+        )
