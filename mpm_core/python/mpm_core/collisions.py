@@ -8,6 +8,7 @@ from . import _core
 from ._core import InputError
 from .checks import positive, within
 from .collective import collectively
+from .input_warnings import warn_of_friction
 
 if TYPE_CHECKING:
     from .model import Model
@@ -42,7 +43,9 @@ def add_collision(ball: RigidContact, other: RigidContact, friction: float, rest
             raise InputError(f"surfaces {numbers[0]} and {numbers[1]} overlap by {-gap:.6g} m, expected them apart")
         return {"ball": numbers[0], "other": numbers[1], "friction": float(friction), "restitution": float(restitution)}
 
-    set_collisions(model, [*model._collisions, collectively(model.comm, entry)])
+    new = collectively(model.comm, entry)
+    warn_of_friction(model.comm, new["friction"])
+    set_collisions(model, [*model._collisions, new])
 
 
 def _kind(model: Model, number: int) -> str:

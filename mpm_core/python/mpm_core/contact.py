@@ -21,7 +21,7 @@ from .contact_strength import (
     strength_of,
     strength_text,
 )
-from .input_warnings import warn_of_friction
+from .input_warnings import warn_of_drag, warn_of_friction
 from .mesh import floats
 from .outlines import mesh_box
 from .rigid_body import FreeBody, Servo, Velocity, describe, rigid_body
@@ -75,6 +75,7 @@ def add_contact(
 
     new = collectively(model.comm, entry)
     warn_of_friction(model.comm, largest(new["friction"]))
+    warn_of_drag(model.comm, largest(new["drag"]))
     if smallest_gap(model, surface) == np.inf:
         raise InputError("the model has no particles, seed some before surfaces are added")
     if not bonded:

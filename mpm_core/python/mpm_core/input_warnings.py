@@ -1,4 +1,4 @@
-"""Warnings of single numbers that are probably in other units: weights, angles, rain, friction, water and its flow."""
+"""Warnings of single numbers that are probably in other units: weights, angles, rain, friction, drag, water and its flow."""
 
 from __future__ import annotations
 
@@ -19,6 +19,9 @@ RADIANS = (0.1, 1.57)
 
 STEEPEST_FRICTION = 2.0
 """Coefficient of friction, of an angle of 63 degrees, above which it is more probably an angle"""
+
+LARGEST_DRAG = 1.0
+"""Coefficient g / xi of a turbulent resistance, of xi = 10 m/s2, above which it is more probably xi itself, some 100 to 2000 m/s2"""
 
 ODD_WATER = (0.1, 200.0, 5000.0)
 """Densities [kg/m3] between the first two and above the last are probably those of water in other units, or under another gravity"""
@@ -94,6 +97,17 @@ def warn_of_friction(comm: MPI.Comm, friction: float) -> None:
         warnings.warn(
             f"friction is {friction:g}, a coefficient of Coulomb friction, which is the tangent of the angle of friction: for an angle "
             f"of {friction:g} degrees give {np.tan(np.radians(friction)):.4g}",
+            RuntimeWarning,
+            stacklevel=4,
+        )
+
+
+def warn_of_drag(comm: MPI.Comm, drag: float) -> None:
+    """Warn of a coefficient of turbulent resistance that is probably Voellmy's xi. Not collective."""
+    if comm.rank == 0 and drag > LARGEST_DRAG:
+        warnings.warn(
+            f"drag is {drag:g}, a coefficient C = g / xi of Voellmy's resistance C rho v^2: for his xi of {drag:g} m/s2 give "
+            f"{9.81 / drag:.4g}",
             RuntimeWarning,
             stacklevel=4,
         )

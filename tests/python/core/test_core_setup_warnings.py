@@ -73,6 +73,24 @@ def test_an_angle_in_place_of_a_coefficient_of_friction_is_said():
         model_of().add_contact(ground, friction=1.0)
 
 
+def test_xi_in_place_of_the_coefficient_of_drag_is_said():
+    line = mpm.Polyline([(-9.0, -1.0), (0.0, -1.0), (9.0, -1.0)])
+    for drag in (500.0, [0.0, 500.0]):
+        with pytest.warns(RuntimeWarning, match="drag is 500, .* C = g / xi .* for his xi of 500 m/s2 give 0.01962"):
+            model_of().add_contact(line, drag=drag)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model_of().add_contact(line, drag=9.81 / 100)
+
+
+def test_an_angle_in_place_of_the_friction_of_a_collision_is_said():
+    model = model_of()
+    ground = model.add_contact(mpm.Plane((0.0, -3.0), (0, 1)))
+    ball = model.add_contact(mpm.Disc((0.0, -1.5), 0.5), body=mpm.FreeBody(mass=100.0))
+    with pytest.warns(RuntimeWarning, match="friction is 30, .* for an angle of 30 degrees give 0.5774"):
+        ball.add_collision(ground, friction=30.0)
+
+
 @pytest.mark.parametrize("density", [1.0, 9810.0])
 def test_a_density_of_water_in_other_units_is_said(density):
     with pytest.warns(RuntimeWarning, match=f"the density of water is {density:g} kg/m3, expected some 1000"):
