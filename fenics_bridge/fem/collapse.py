@@ -12,7 +12,8 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fenics_bridge.errors import agree
+import mpm_core as mpm
+from fenics_bridge.errors import InputError, agree
 from fenics_bridge.fem.load_steps import LoadStep, advance
 from fenics_bridge.fem.loads import Load
 from fenics_bridge.fem.locking import warn_of_few_cells, warn_of_locking_at_failure
@@ -125,8 +126,13 @@ def factor_of_safety(
         The result, whose value is the factor, and whose `failed` says whether failure was shown above it.
 
     Raises:
-        InputError: the load is not carried at the start. Raised on all ranks alike.
+        InputError: the model is another one, or the load is not carried at the start. Raised on all ranks alike.
     """
+    if isinstance(model, mpm.Model) or not hasattr(model, "law"):
+        raise InputError(
+            f"model is {type(model).__name__}, expected a QuasiStatic or a MixedQuasiStatic; for particles there is "
+            "particle_safety"
+        )
     law = model.law
     model.law = reduce(law, start, unreduced)
 

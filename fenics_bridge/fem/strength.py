@@ -41,6 +41,8 @@ def reduced_strength(law: Laws, factor: float, unreduced: Collection[int | str] 
     """
     if not (is_finite(factor) and factor > 0):
         raise InputError(f"factor is {factor!r}, expected a positive number")
+    if isinstance(unreduced, (str, int)) or not isinstance(unreduced, Collection):
+        raise InputError(f"unreduced is {unreduced!r}, expected a list of cell tags or names, such as ['rock']")
     if isinstance(law, dict):
         unknown = [tag for tag in unreduced if tag not in law]
         if unknown:

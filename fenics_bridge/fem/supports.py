@@ -227,9 +227,16 @@ def tagged_facets(comm: MPI.Comm, facet_tags: MeshTags, tag: Tag, argument: str)
     return facet_tags.indices[np.isin(facet_tags.values, tag_numbers(comm, facet_tags, tag, argument))]
 
 
+def not_supports(supports: Any) -> str | None:
+    """What is wrong where an argument is no list of supports."""
+    if isinstance(supports, Sequence) and all(isinstance(support, Support) for support in supports):
+        return None
+    return f"supports is {supports!r}, expected a list of what `fixed`, `roller` and `prescribed` return"
+
+
 def _first_mistake(domain: Mesh, facet_tags: MeshTags, supports: Sequence[Support], dim: int) -> str | None:
-    if isinstance(supports, Support) or not all(isinstance(support, Support) for support in supports):
-        return f"supports is {supports!r}, expected a list of what `fixed`, `roller` and `prescribed` return"
+    if text := not_supports(supports):
+        return text
     for support in supports:
         tag_numbers(domain.comm, facet_tags, support.facet_tag, "supports")
         displacement = support.displacement

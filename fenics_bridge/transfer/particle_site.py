@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import mpm_core as mpm
 from fenics_bridge.errors import InputError, agree, real_numbers
 from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport
-from fenics_bridge.fem.supports import Support
+from fenics_bridge.fem.supports import Support, not_supports
 from fenics_bridge.transfer.particle_forces import boundary_forces, seepage_forces
 
 
@@ -233,8 +233,10 @@ def apply_supports(model: mpm.Model, supports: Sequence[Support]) -> None:
         supports: boundary conditions as for `QuasiStatic`.
 
     Raises:
-        InputError: a support prescribes a displacement, or a boundary does not exist. Raised on all ranks alike.
+        InputError: what is given is no list of supports, one prescribes a displacement, or a boundary does not exist. Raised on all
+            ranks alike.
     """
+    agree(model.comm, not_supports(supports))
     for support in supports:
         if any(support.displacement or ()):
             raise InputError(f"supports: {support} prescribes a displacement, expected only zeros for particles")

@@ -1,6 +1,6 @@
 """The background mesh."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -224,7 +224,10 @@ class Mesh:
             InputError: no cell or facet has one of them; the message lists the known names and tags.
         """
         names, known, tags = self.names[kind], self.tags[kind], []
-        for one in [given] if isinstance(given, (str, int, np.integer)) else given:
+        several = [given] if isinstance(given, (str, int, np.integer)) else given
+        if not isinstance(several, Iterable) or not all(isinstance(one, (str, int, np.integer)) for one in several):
+            raise InputError(f"{kind}_tag is {given!r}, expected a number or a name, or several of them")
+        for one in several:
             present = [tag for tag in (names.get(one, ()) if isinstance(one, str) else (int(one),)) if tag in known]
             if not present:
                 there = [*(name for name, of_name in names.items() if known & {*of_name}), *sorted(known)]

@@ -26,8 +26,9 @@ class ParticleValues:
     _core: Any
 
     def _material(self, material: int) -> int:
-        if not 0 <= material < len(self.laws):
-            raise InputError(f"material is {material}, expected 0 to {len(self.laws) - 1}, the number of a law")
+        whole = isinstance(material, (int, np.integer)) and not isinstance(material, bool)
+        if not (whole and 0 <= material < len(self.laws)):
+            raise InputError(f"material is {material!r}, expected 0 to {len(self.laws) - 1}, the number of a law")
         return material
 
     def add_field(self, name: str, *, unit: str, meaning: str, components: int = 1, initial: float = 0.0) -> None:

@@ -103,7 +103,8 @@ class Particles:
         try:
             return self._column(name)
         except InputError as error:
-            raise AttributeError(str(error)) from None
+            fields = {"displacement", "plastic_strain", *(field["name"] for field in self.schedule())}
+            raise AttributeError(f"{error}, expected one of {', '.join(sorted(fields))}") from None
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *(field["name"] for field in self.schedule())})

@@ -115,7 +115,7 @@ def describe(
 
 
 def _axes(axes: Sequence[bool], dim: int) -> list[bool]:
-    if len(axes) != dim or not all(isinstance(axis, bool | np.bool_) for axis in axes):
+    if np.ndim(axes) != 1 or len(axes) != dim or not all(isinstance(axis, bool | np.bool_) for axis in axes):
         raise InputError(f"axes is {axes!r}, expected {dim} times True or False")
     return [bool(axis) for axis in axes]
 

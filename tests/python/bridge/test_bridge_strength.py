@@ -103,6 +103,8 @@ def test_some_soils_stay_as_they_are():
         bridge.reduced_strength(laws, 2.0, unreduced=[1, 2])
     with pytest.raises(bridge.InputError, match=r"unreduced.*7.*\[1, 2, 3\]"):
         bridge.reduced_strength(laws, 2.0, unreduced=[7])
+    with pytest.raises(bridge.InputError, match="unreduced is 'rock', expected a list of cell tags or names"):
+        bridge.reduced_strength(laws, 2.0, unreduced="rock")  # no law of 'r'
     for reduce in (bridge.reduced_strength, bridge.davis_reduced_strength):
         with pytest.raises(bridge.InputError, match=r"unreduced is \[1\] with one law .* expected laws by cell tag"):
             reduce(laws[1], 2.0, [1])
@@ -213,3 +215,15 @@ def test_strength_of_davis():
     assert bridge.davis_strength(associated).friction_angle == pytest.approx(30.0)
     once = bridge.davis_reduced_strength({1: sand()}, 1.3)[1]
     assert once == bridge.davis_strength(bridge.reduced_strength(sand(), 1.3))
+
+
+def test_a_factor_of_safety_is_not_that_of_particles():
+    domain, cell_tags, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (1.0, 1.0), (2, 2))
+    model = mpm.Model(
+        bridge.background_mesh(domain, cell_tags, facet_tags), mpm.tresca(young=1e6, poisson=0.3, shear_strength=1e3)
+    )
+    with pytest.raises(bridge.InputError, match="model is Model, expected a QuasiStatic .* particle_safety"):
+        bridge.factor_of_safety(model, bridge.Load(unit_weight=18e3))
+    for supports in (None, bridge.fixed(3)):
+        with pytest.raises(bridge.InputError, match="supports is .*, expected a list"):
+            bridge.apply_supports(model, supports)

@@ -264,3 +264,34 @@ def test_bad_questions(model):
         model.mesh.cells_of([0.5, 0.5])
     with pytest.raises(mpm.InputError, match="points is nan"):
         model.mesh.cells_of([[0.5, np.nan]])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda model: model.fix(None), "facet_tag is None, expected a number or a name"),
+        (lambda model: model.fix(1.5), "facet_tag is 1.5, expected a number or a name"),
+        (lambda model: model.roller([5, None], (1, 0)), r"facet_tag is \[5, None\], expected a number or a name"),
+        (
+            lambda model: model.seed(density=1.0, material="clay"),
+            "material is 'clay', expected 0 to 0, the number of a law",
+        ),
+        (
+            lambda model: model.add_contact(mpm.Disc((0.5, 9.0), 1.0), body=mpm.FreeBody(mass=1.0, axes=True)),
+            "axes is True, expected 2 times True or False",
+        ),
+    ],
+)
+def test_what_is_no_tag_no_number_and_no_list_is_named(wrong, words):
+    model = mpm.Model(mpm.Mesh(**GOOD_MESH), mpm.LinearElastic(young=1e6, poisson=0.2))
+    model.seed(density=1000.0, per_cell=3)
+    with pytest.raises(mpm.InputError, match=words):
+        wrong(model)
+
+
+def test_an_unknown_field_is_answered_with_those_that_there_are():
+    model = mpm.Model(mpm.Mesh(**GOOD_MESH), mpm.LinearElastic(young=1e6, poisson=0.2))
+    model.seed(density=1000.0, per_cell=3)
+    model.add_field("strength", unit="Pa", meaning="Shear strength")
+    with pytest.raises(AttributeError, match="'speed', which does not exist, expected one of .* strength, .* velocity"):
+        model.particles.to_dataframe("position", "speed")
