@@ -184,3 +184,22 @@ def rigid_body(entry: dict[str, Any]) -> Any:
         entry["centre"], tuple(entry["velocity"]), (entry["spin"][0], spins), entry["drive"], entry["rotates"], entry["mass"],
         entry["inertia"], tuple(entry["force"]), entry["speed"], velocity, at_start(entry["spin"][0], spins),
     )  # fmt: skip
+
+
+def motion_text(entry: dict[str, Any], geometry: Geometry) -> str:
+    """How a body moves, in words with units; empty for one at rest."""
+    per = {Geometry.PLANE_STRAIN: "/m", Geometry.AXISYMMETRIC: "/rad"}.get(geometry, "")
+    texts = []
+    if 2 in entry["drive"]:
+        texts.append(f"servo of {_rows(entry['force'])} N{per}")
+    elif any(entry["drive"]) or entry["rotates"]:
+        texts.append(f"free body of {entry['mass']:g} kg{per}")
+    moves = [("velocity", "m/s"), ("spin", "rad/s")]
+    texts += [f"{name} {_rows(entry[name])} {unit}" for name, unit in moves if np.any(entry[name][1])]
+    return "".join(f", {text}" for text in texts)
+
+
+def _rows(table: tuple[list[float], list[list[float]]]) -> str:
+    """A vector, or the first and last ones of a table over time."""
+    first, last = (", ".join(f"{value:g}" for value in row) for row in (table[1][0], table[1][-1]))
+    return f"({first})" if len(table[0]) == 1 else f"({first}) to ({last})"

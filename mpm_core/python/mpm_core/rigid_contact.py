@@ -12,6 +12,7 @@ from .collisions import add_collision
 from .contact_strength import strength_text
 from .mesh import floats
 from .outlines import Outline, mesh_box, outline
+from .rigid_body import motion_text
 from .surface_description import place_of, surface_of
 
 if TYPE_CHECKING:
@@ -36,7 +37,8 @@ class RigidContact:
     def __repr__(self) -> str:
         entry = self.model._contacts[self._index]
         how = "tied" if entry["bonded"] else strength_text(entry)
-        return f"<RigidContact {self._number}: {surface_of(self.model, entry['surface'])!r}, {how}>"
+        moves = motion_text(entry["body"], self.model.geometry)
+        return f"<RigidContact {self._number}: {surface_of(self.model, entry['surface'])!r}, {how}{moves}>"
 
     def _state(self) -> dict[str, Any]:
         return _core.contact_state(self.model._core, self._index)  # type: ignore[no-any-return]

@@ -93,10 +93,11 @@ def _vector(values: Sequence[float | None] | np.ndarray) -> str:
 
 def report_text(report: Report) -> str:
     """A report in words: time, steps, mass, energies, out-of-balance ratio."""
+    work = "unknown" if np.isnan(report.plastic_work) else f"{report.plastic_work:.4g} J"  # of laws in Python and UMATs
     return (
         f"<{type(report).__name__}: t = {report.time:g} s after {report.steps} steps, the last of {report.dt:.3g} s; "
         f"{report.particles} particles, {report.mass:.6g} kg; kinetic energy {report.kinetic_energy:.4g} J, external work "
-        f"{report.external_work:.4g} J, plastic work {report.plastic_work:.4g} J; {report.plastic_fraction:.1%} yield, "
+        f"{report.external_work:.4g} J, plastic work {work}; {report.plastic_fraction:.1%} yield, "
         f"out-of-balance ratio {report.unbalanced_ratio:.2g}>"
     )
 

@@ -210,6 +210,35 @@ def test_the_text_of_a_model_has_its_water_and_its_rigid_surfaces():
     assert "RigidContact 0: Plane" in repr(model) and "friction 0.3" in repr(model)
 
 
+def test_the_text_of_a_rigid_surface_says_how_it_moves():
+    model = mpm.Model(box((4, 4)), mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed(density=2000.0, per_cell=3)
+    rest, stone, plate, blade = (
+        model.add_contact(mpm.Disc((k, 9.0), 0.4), **motion)
+        for k, motion in enumerate([
+            {}, {"body": mpm.FreeBody(mass=300.0), "velocity": (1.0, 0.0)},
+            {"body": mpm.Servo(force=([0.0, 1.0], [(0.0, 0.0), (0.0, -5e3)]), speed=0.1)}, {"spin": 0.2},
+        ])
+    )  # fmt: skip
+    assert repr(rest).endswith("friction 0, adhesion 0 Pa>")
+    assert repr(stone).endswith("free body of 300 kg/m, velocity (1, 0) m/s>")
+    assert repr(plate).endswith("servo of (0, 0) to (0, -5000) N/m>")
+    assert repr(blade).endswith("spin (0.2) rad/s>")
+    assert "free body of 300 kg/m" in repr(model)
+
+
+def test_the_plastic_work_of_a_law_in_python_is_unknown():
+    class Law:
+        n_state, p_wave_modulus = 1, 1e6
+
+        def update(self, strain_increment, stress, state, tangent):
+            stress += 1e6 * strain_increment
+
+    model = mpm.Model(box((4, 4)), mpm.PythonLaw(Law()))
+    model.seed(density=2000.0, per_cell=3)
+    assert "plastic work unknown; " in repr(model.explicit(0.01).last())
+
+
 def test_a_bar_shows_the_simulated_time(model, capsys):
     reports = list(model.explicit(0.03, every=0.01).with_progress())
     assert [round(report.time, 9) for report in reports] == [0.02, 0.03]
