@@ -195,7 +195,10 @@ def plot_particles(particles: Particles, name: str, axes: Any, area: np.ndarray)
     if dim == 3:
         drawn = axes.scatter(*position.T, c=values, s=2)
         axes.set_zlabel("z [m]")
-        axes.set_box_aspect(np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1))  # equal scales
+        extents = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
+        axes.set_box_aspect(extents)  # equal scales
+        for axis, extent in zip("xyz", extents, strict=True):  # numbers of a thin side would lie on one another
+            axes.locator_params(axis=axis, nbins=max(1, round(8 * extent / extents.max())), min_n_ticks=1)
     else:
         size = COVER * np.sqrt(area)
         drawn = EllipseCollection(

@@ -195,6 +195,15 @@ def test_circles_of_a_picture_leave_hardly_any_gaps(per_cell):
     assert (distance <= circles._widths).any(axis=1).mean() > 0.98
 
 
+def test_a_thin_side_of_a_picture_in_space_has_few_numbers():
+    model = mpm.Model(box((7, 1, 2), (14.0, 1.6, 4.0)), mpm.LinearElastic(young=1e6, poisson=0.3))
+    model.seed(density=2000.0, per_cell=8)
+    axes = model.particles.plot("displacement")
+    low, high = axes.get_ylim()
+    assert 1 <= ((axes.get_yticks() >= low) & (axes.get_yticks() <= high)).sum() <= 2
+    assert len(axes.get_xticks()) >= 6
+
+
 def test_the_text_of_a_model_has_its_water_and_its_rigid_surfaces():
     model = mpm.Model(box((4, 4)), mpm.LinearElastic(young=1e6, poisson=0.3))
     model.seed(density=2000.0, per_cell=3)
