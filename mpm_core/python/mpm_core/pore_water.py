@@ -81,7 +81,8 @@ class PoreWater(Conditions):
                 are not full, and pressure comes back when they are; no water enters at free surfaces then. By default
                 it bears any.
             drained_surface: hold the pressure at zero along the free surface of the soil, wherever it is in the mesh, or at that
-                of the water of `stand_water`. Soil that may dry lets water out there, and takes in the rain of `rain`. Where soil
+                of the water of `stand_water`. Without a retention curve water enters there as well as it leaves, so that soil
+                never drains. Soil that may dry lets water out there, and takes in the rain of `rain`. Where soil
                 ends at the border of the mesh there is no free surface, see `hold_pore_pressure`; implicit runs warn at the top.
             retention: retention curve of soil that dries under suction in implicit runs, or a list with one for each law (None
                 where soil stays saturated): an object with functions ``saturation``, ``effective`` and
