@@ -167,10 +167,18 @@ class Stepper:
             if self.control.is_too_short:
                 raise RunError(
                     f"the implicit step at t = {self._core.time:.9g} s failed with all step lengths from "
-                    f"{self.control.longest:.3g} s down to {dt:.3g} s: {reason}"
+                    f"{self.control.longest:.3g} s down to {dt:.3g} s: {reason}{self._advice(reason)}"
                 )
         if self.last.easy:
             self.control.grow(self._growth)
+
+    def _advice(self, reason: str) -> str:
+        """What helps where the solver of a step gave up, which it often does as the soil fails."""
+        if not reason.endswith("iterations"):
+            return ""
+        if self._options.quasi_static:
+            return "; if the soil fails here there is no equilibrium, and it moves in steps with inertia (quasi_static=False)"
+        return "; if the soil fails here it moves much faster than before: take a dt that is short for a slide, such as 0.05 s"
 
     def attempt(self, dt: float) -> str:
         """Try one step; the particles change only if it succeeds. Returns the reason of a failure, or an empty text."""

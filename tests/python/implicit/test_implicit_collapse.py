@@ -44,7 +44,9 @@ def test_displacements_and_collapse_load_are_those_of_the_finite_elements(nmd):
     assert np.abs(apart).max() < 1e-6 * np.abs(expected).max()
 
     collapse = bridge.collapse_load(fem, lambda g: bridge.Load(unit_weight=g), 1e3, start=weight)
-    with pytest.raises(mpm.RunError, match="failed with all step lengths"):
+    with pytest.raises(
+        mpm.RunError, match="failed with all step lengths.* iterations; if the soil fails here there is no equilibrium"
+    ):
         raised(model, TOP, 1e3, nmd, solver=mpm.Newton(max_iterations=12))
     assert TOP * model.time == pytest.approx(collapse.value, rel=5e-3)
     assert np.array_equal(model.particles.position, start) and np.ptp(model.particles.volume) < 1e-12
@@ -53,3 +55,12 @@ def test_displacements_and_collapse_load_are_those_of_the_finite_elements(nmd):
 def test_small_displacements_are_for_quasi_static_runs():
     with pytest.raises(mpm.InputError, match="small_displacements is True, expected False"):
         rising_slope().implicit(1.0, dt=1.0, small_displacements=True)
+
+
+def test_steps_that_are_too_long_for_soil_that_fails_are_answered_with_shorter_ones():
+    model = rising_slope()
+    one = mpm.Newton(max_iterations=1, tolerance=1e-12)  # as no solver finds a slide in steps of minutes
+    with pytest.raises(
+        mpm.RunError, match="after 1 iterations; if the soil fails here it moves .* a dt that is short for a slide"
+    ):
+        list(model.implicit(1.0, dt=1.0, solver=one))
