@@ -24,7 +24,8 @@ class Solver:
     max_iterations: int = 25
     """Largest number of iterations of Newton's method in a step"""
     relaxation: bool = True
-    """Whether `relaxation.relax` takes over where Newton's method does not converge"""
+    """Whether `relaxation.relax` takes over where Newton's method does not converge; coupled with water it does not, and
+    `relaxed_tolerance` then holds for what Newton's method reaches"""
     relaxed_tolerance: float = 1e-5
     """Out-of-balance force at which a relaxation ends [-]; where a cell that yields lacks more than 1 % of its strength then, a tenth
     of it, down to a thousandth"""

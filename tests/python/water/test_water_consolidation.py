@@ -13,10 +13,12 @@ from consolidation_cases import (
     layer_settled,
 )
 from mpi4py import MPI
+from mpm_core.newton import NewtonReport
 
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import water
+from fenics_bridge.water.consolidation_step import accepted
 
 AVERAGED = pytest.mark.parametrize("nmd", [False, True], ids=["", "nmd"])
 MESHES = Path(__file__).resolve().parents[3] / "meshes"
@@ -181,3 +183,17 @@ def test_drawdown_over_level_ground_changes_no_effective_stress(element, conduct
 def buoyant_at_rest(column):
     """Start with the effective stresses of the buoyant weight under hydrostatic pressure below a level of 6 m."""
     column.model.initialise(column.stress_at_rest(), lambda x: GRAVITY_OF_WATER * (6.0 - x[:, -1]))
+
+
+@pytest.mark.parametrize("last, solver, taken", [
+    (3e-8, bridge.Solver(), True),
+    (9e-6, bridge.Solver(), True),
+    (2e-5, bridge.Solver(), False),
+    (np.inf, bridge.Solver(), False),
+    (3e-8, bridge.Solver(relaxation=False), False),
+    (9e-6, bridge.Solver(relaxed_tolerance=1e-6), False),
+])  # fmt: skip
+def test_forces_that_newton_brings_no_further_are_balanced_up_to_the_tolerance_of_relaxations(last, solver, taken):
+    given = NewtonReport(False, [1.0, 1e-7, last], "residual after 25 iterations")
+    report = accepted(given, solver)
+    assert report.converged is taken and (report.reason == "") is taken and report.residuals == given.residuals
