@@ -176,15 +176,17 @@ std::optional<ParticleForce<D>> particle_force(const Press<D>& press, const Dist
     component *= area;
   const Resistance& strength = resistance_at(contact, nearest.part);
   const double cohesive = strength.adhesion + turbulent_stress(strength, press, touch, particles, p); // [Pa]
-  const double covered = area * (cohesive > 0 ? covered_part(touch.after, radius) : depth > 0 ? 1 : 0);
-  if (!(depth > 0) && !(cohesive > 0))
+  const bool clings = strength.adhesion > 0 || strength.drag > 0;
+  const double covered = area * (clings ? covered_part(touch.after, radius) : depth > 0 ? 1 : 0);
+  if (!(depth > 0) && !clings)
   {
     leave_slip<D>(press, p);
     return water ? std::optional(found) : std::nullopt;
   }
   const double pressed = std::max(depth, 0.0);
   reaction.area += covered;
-  reaction.mass += depth > 0 ? mass : 0;
+  reaction.mass += mass;
+  reaction.pressing += depth > 0 ? mass : 0;
   reaction.normal += stiffness * pressed;
   const WaterShare share{water && depth > 0 ? water->fraction(particles.cell[p], touch.normal) : 0};
   if (press.slips)

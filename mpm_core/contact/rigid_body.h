@@ -28,7 +28,8 @@ struct Reaction
   double normal = 0;   ///< sum of the normal forces [N]
   double area = 0;     ///< of the soil in contact [m2]
   double sticking = 0; ///< part of that area that does not slide [m2]
-  double mass = 0;     ///< of the particles in contact [kg]
+  double mass = 0;     ///< of the particles that act on it [kg]
+  double pressing = 0; ///< part of that mass that touches it; not of a restored model before its next step [kg]
   double load = 0;     ///< sum of m (1/M + r^2/I) over the particles in contact or about to be; bodies that move freely
   double energy = 0;   ///< of the springs at the step's start [J]
 };

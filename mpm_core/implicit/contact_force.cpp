@@ -301,13 +301,14 @@ void keep_slip(Model<G>& model, const ImplicitStep<G>& step)
     {
       for (std::size_t i = 0; slips && i < D; ++i)
         (*slips)[i][p] = touch.slip[i];
-      if (contact.bond.empty() && !(touch.depth > 0) && touch.slip == Vector<D>{})
+      if (contact.bond.empty() && touch.presses && !(touch.depth > 0))
         continue;
       react<D>(touch.force, touch.arm, reaction);
       reaction.normal += dot<D>(touch.force, touch.normal);
       reaction.area += touch.covered;
       reaction.sticking += (slips || !contact.bond.empty()) && touch.sticks ? touch.covered : 0;
-      reaction.mass += touch.presses ? model.particles.mass[p] : 0;
+      reaction.mass += model.particles.mass[p];
+      reaction.pressing += touch.presses ? model.particles.mass[p] : 0;
       const double slips_by = contact.bond.empty() ? spring.shear : spring.stiffness;
       reaction.energy +=
           0.5 * (spring.stiffness * touch.depth * touch.depth + slips_by * dot<D>(touch.slip, touch.slip));

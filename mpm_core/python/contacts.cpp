@@ -109,7 +109,7 @@ py::dict contact_state(const Model<G>& model, std::size_t number)
   state["sticking"] = sums.reaction.sticking;
   state["energy"] = sums.reaction.energy;
   // Of explicit steps: the mean over the mass that touches.
-  const double spring = contact.penalty * sums.reaction.mass;
+  const double spring = contact.penalty * sums.reaction.pressing;
   state["penetration"] = spring > 0 ? sums.reaction.normal * contact.stiff_step * contact.stiff_step / spring : 0;
   state["collision_impulse"] = body.collision_impulse;
   state["displacement"] = body.displacement;

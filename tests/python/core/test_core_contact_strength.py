@@ -195,6 +195,27 @@ def test_adhesion_acts_on_all_of_the_surface_wherever_particles_lie(scheme, per_
     assert ground.area == pytest.approx(length, rel=error)
 
 
+@pytest.mark.parametrize("per_cell", [3, 6])
+def test_a_servo_keeps_its_load_by_adhesion(per_cell):
+    # A plate that is dragged along with 300 N/m by an adhesion that could bear 3200. Its dashpot m / dt has the mass of all particles that
+    # hold it, also of those that do not touch it: with the mass of these alone it swung, by -3082 to 1656 N/m.
+    model = mpm.Model(box((16, 4), (4.0, 1.0), diagonals="alternating", body=((1, 0), (3, 0.5))), SAND)
+    model.seed(density=1800.0, per_cell=per_cell, cell_tag=1)
+    model.set_gravity((0.0, -G))
+    model.add_contact(
+        mpm.Plane((0.0, model.gap(mpm.Plane((0.0, 0.0), (0.0, 1.0))) - 1e-9), (0.0, 1.0)), friction=1.0, adhesion=5e3
+    )
+    top = mpm.Plane((0.0, 0.5), (0.0, -1.0))
+    level = 0.5 - model.gap(top) + 1e-9
+    servo = mpm.Servo(force=(300.0, -500.0), speed=0.05)
+    plate = model.add_contact(mpm.Box((1.2, level), (2.8, level + 0.3)), adhesion=2e3, penalty=1.0, body=servo)
+    list(model.explicit(0.5, damping=0.3))
+    before = plate.impulse[0]
+    forces = [plate.force[0] for _ in model.explicit(1.0, every=0.05, damping=0.3)]
+    assert (plate.impulse[0] - before) / 0.5 == pytest.approx(-300.0, rel=0.02)
+    assert forces == pytest.approx(np.full(len(forces), -300.0), rel=0.1)
+
+
 def test_adhesion_ends_where_soil_leaves_the_surface():
     # Lifted by its particles' radius it is gone; in between its strength falls with the distance.
     found = []
