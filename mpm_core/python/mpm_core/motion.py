@@ -134,7 +134,7 @@ def _two_columns(path: str, lines: list[str]) -> tuple[NDArray[np.float64], NDAr
     return columns[:, 0], columns[:, 1]
 
 
-_NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _HEADERS = (
     re.compile(rf"NPTS\s*=\s*(\d+)\D.*?DT\s*=\s*({_NUMBER})", re.IGNORECASE),
     re.compile(rf"(\d+)\s+({_NUMBER})\s+NPTS\s*,\s*DT", re.IGNORECASE),

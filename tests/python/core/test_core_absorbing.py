@@ -253,7 +253,14 @@ ACCELERATION TIME SERIES IN UNITS OF G
 
 
 @pytest.mark.parametrize(
-    "last", ["NPTS=     7, DT=   .0050 SEC,", "NPTS= 7  DT= 5.0E-03 SEC", "    7    0.0050    NPTS, DT"]
+    "last",
+    [
+        "NPTS=     7, DT=   .0050 SEC,",
+        "NPTS= 7  DT= 5.0E-03 SEC",
+        "NPTS= 7, DT= 5.E-03 SEC",
+        "    7    0.0050    NPTS, DT",
+        "    7    5.E-3    NPTS, DT",
+    ],
 )
 def test_a_file_of_the_peer_database_is_read(tmp_path, last):
     path = tmp_path / "RSN1.AT2"
