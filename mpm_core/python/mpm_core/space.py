@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 LEAST_FILLED = 0.85
 """Filled volume over that of the particles below which a run warns"""
 
+ALIKE = 0.05
+"""Difference of that fraction up to which it counts as the one at the start"""
+
 LEAST_PART = 0.01
 """Fraction of the mass above which a piece of the body counts as a part"""
 
@@ -124,7 +127,7 @@ class SpaceWatch:
         self._parts = count_parts(model)
         self._steps = model.steps
         at_start = space(model)
-        self._uneven = at_start.filled < LEAST_FILLED * at_start.particles
+        self._at_start = at_start.filled / at_start.particles if at_start.particles > 0 else 1.0
 
     def look(self) -> None:
         """Warn if the body has come apart, or takes up too little space. Collective."""
@@ -144,16 +147,26 @@ class SpaceWatch:
                 stacklevel=5,
             )
         if volumes.filled < LEAST_FILLED * volumes.particles:
-            cause = (
-                "they did so at the start, as on a regular grid of points, some of which lie on the sides of cells, or where soil "
-                "was placed twice; Model.seed fills cells evenly"
-                if self._uneven
-                else "they accumulate in some cells, so that the body takes up too little space; this is less with "
-                "integration=MIXED than with PARTICLES"
-            )
+            filled = volumes.filled / volumes.particles
             warnings.warn(
-                f"the particles fill {100 * volumes.filled / volumes.particles:.0f} % of their volume at t = "
-                f"{self._model.time:.6g} s: {cause}",
+                f"the particles fill {100 * filled:.0f} % of their volume at t = "
+                f"{self._model.time:.6g} s: {crowding(filled, self._at_start)}",
                 RuntimeWarning,
                 stacklevel=5,
             )
+
+
+def crowding(filled: float, at_start: float) -> str:
+    """Why particles fill too little space, by the fraction of their volume that they fill now and at the start of the run."""
+    gathers = (
+        "they accumulate in some cells, so that the body takes up too little space; this is less with integration=MIXED than with "
+        "PARTICLES"
+    )
+    if at_start >= LEAST_FILLED:
+        return gathers
+    alike = filled > at_start - ALIKE
+    placed = (
+        f"they {'did so' if alike else f'filled {100 * at_start:.0f} %'} at the start, as on a regular grid of points, some of which "
+        "lie on the sides of cells, or where soil was placed twice; Model.seed fills cells evenly"
+    )
+    return placed if alike else f"{placed}. Since then {gathers}"

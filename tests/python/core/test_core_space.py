@@ -73,6 +73,16 @@ def test_particles_that_crowd_are_said_to_lose_space():
         run(once, 2e-3, dt=1e-3 / 256)
 
 
+def test_particles_that_crowd_more_than_at_the_start_are_said_to_accumulate():
+    model = blocks(2, ([0.25, 0.25], [0.75, 0.75]), ([0.25, 0.25], [0.75, 0.75]))
+    with pytest.warns(RuntimeWarning, match="fill 50 % of their volume at t = 0.001 s: they did so at the start"):
+        run(model, 1e-3, dt=1e-3 / 256)
+    model.place(0.5 + 0.5 * (model.particles.position - 0.5))  # a quarter of the area
+    text = "fill 1. % of .*: they filled 50 % at the start, .* Since then they accumulate in some cells"
+    with pytest.warns(RuntimeWarning, match=text):
+        run(model, 2e-3, dt=1e-3 / 256)
+
+
 def test_energy_that_swollen_particles_may_generate_is_reported_with_their_size():
     """A quarter of a cell in each direction, blown up to three cells; others than the largest do not matter."""
     model = blocks(2, ([0.25, 0.25], [0.75, 0.75]))
