@@ -68,6 +68,12 @@ def _by_triangle(name: str, value: float | Raster, ground: Raster, surface: mpm.
     """A number, or the values of a raster at the centres of the triangles of the ground."""
     if not isinstance(value, Raster):
         return value
+    require_cover(name, value, ground)
+    return value.at(surface.vertices[surface.triangles].mean(axis=1))
+
+
+def require_cover(name: str, value: Raster, ground: Raster) -> None:
+    """Raises InputError where a raster has another coordinate reference than the ground, or does not cover it."""
     if value.crs != ground.crs:
         raise InputError(f"{name} is in {value.crs!r}, expected {ground.crs!r} as the ground")
     for axis in "xy":
@@ -76,7 +82,6 @@ def _by_triangle(name: str, value: float | Raster, ground: Raster, surface: mpm.
             raise InputError(
                 f"{name} covers {axis} {there[0]:.10g} to {there[-1]:.10g} m, expected {needed[0]:.10g} to {needed[-1]:.10g} m as the ground"
             )
-    return value.at(surface.vertices[surface.triangles].mean(axis=1))
 
 
 def _points(before: Any, rupture: Any, surface: Any, spacing: float) -> tuple[Any, ...]:

@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 import mpm_core as mpm
 from fenics_bridge.terrain import Raster, read_raster
+from fenics_bridge.terrain.slide import require_cover
 
 from .checks import check_effect, check_file, say
 from .options import add_number
@@ -73,7 +74,16 @@ def ground_strength(a: Namespace, ground: Raster) -> dict[str, float | Raster]:
                 f"--turbulence-map has values from {turbulence.values.min():g} on, expected some above 0 m/s2"
             )
         drag = _mapped(turbulence, GRAVITY / turbulence.values)
+        doubt_turbulence("--turbulence-map has values from", float(turbulence.values.min()))
+    elif a.turbulence is not None:
+        doubt_turbulence("--turbulence is", a.turbulence)
     return {"friction": friction, "adhesion": a.ground_adhesion, "drag": drag}
+
+
+def doubt_turbulence(given: str, turbulence: float) -> None:
+    """Warn of a coefficient of turbulent resistance [m/s2] that is probably g / xi."""
+    say(f"{given} {turbulence:g} m/s2, expected Voellmy's coefficient xi, some 100 to 2000 m/s2: the slide hardly moves"
+        if turbulence < GRAVITY else "")  # fmt: skip
 
 
 def read_map(name: str, path: Path, ground: Raster) -> Raster:
@@ -83,12 +93,13 @@ def read_map(name: str, path: Path, ground: Raster) -> Raster:
         name: of its option.
 
     Raises:
-        InputError: it cannot be read.
+        InputError: it cannot be read, or does not cover the ground.
     """
+    names_its_own = path.with_suffix(".prj").is_file() or path.suffix.lower() in (".tif", ".tiff")
     try:
-        return read_raster(
-            path, crs=None if path.with_suffix(".prj").is_file() or path.suffix[:4] == ".tif" else ground.crs
-        )
+        raster = read_raster(path, crs=None if names_its_own else ground.crs)
+        require_cover(str(path), raster, ground)
+        return raster
     except mpm.InputError as error:
         raise mpm.InputError(f"{name}: {error}") from None
 

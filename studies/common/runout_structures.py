@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import mpm_core as mpm
+from fenics_bridge.terrain import Raster
 
 from .checks import say
 from .figures import curve_figure
@@ -39,11 +40,11 @@ class Structure:
         return dict(zip(self.columns, force, strict=True))
 
 
-def read_structures(paths: list[Path]) -> dict[str, mpm.Triangles]:
+def read_structures(paths: list[Path], ground: Raster) -> dict[str, mpm.Triangles]:
     """Closed surfaces by the names of their files.
 
     Raises:
-        InputError: a file that cannot be read, a surface that is not closed, or two of one name.
+        InputError: a file that cannot be read, a surface that is not closed, is inside out or beside the ground, or two of one name.
     """
     bodies: dict[str, mpm.Triangles] = {}
     for path in paths:
@@ -56,8 +57,42 @@ def read_structures(paths: list[Path]) -> dict[str, mpm.Triangles]:
         sides = np.sort(body.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         if 2 * len(np.unique(sides, axis=0)) != len(sides):
             raise mpm.InputError(f"--structure: {path} has a border, expected a closed surface")
+        if volume_of(body) <= 0:
+            raise mpm.InputError(
+                f"--structure: {path} is inside out, expected triangles that run counterclockwise as seen from outside"
+            )
+        require_on_ground(path.stem, body, ground)
         bodies[path.stem] = body
     return bodies
+
+
+def volume_of(body: mpm.Triangles) -> float:
+    """Volume within a closed surface [m3], negative where it is inside out."""
+    a, b, c = np.moveaxis(body.vertices[body.triangles] - body.vertices[0], 1, 0)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+def require_on_ground(name: str, body: mpm.Triangles, ground: Raster) -> None:
+    """Warn of a structure that is above or below the ground.
+
+    Raises:
+        InputError: it is beside the ground.
+    """
+    low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
+    if low[0] > ground.x[-1] or high[0] < ground.x[0] or low[1] > ground.y[-1] or high[1] < ground.y[0]:
+        raise mpm.InputError(
+            f"--structure {name} is at x {low[0]:.10g} to {high[0]:.10g} m, y {low[1]:.10g} to {high[1]:.10g} m, expected a place on "
+            f"the ground, x {ground.x[0]:.10g} to {ground.x[-1]:.10g} m and y {ground.y[0]:.10g} to {ground.y[-1]:.10g} m"
+        )
+    height = body.vertices[:, 2] - ground.at(body.vertices)
+    if height.min() > 0:
+        say(
+            f"--structure {name} is {height.min():.3g} m above the ground at least, expected one that reaches into it: soil passes below"
+        )
+    if height.max() <= 0:
+        say(
+            f"--structure {name} is {-height.max():.3g} m below the ground at least, expected one that stands in its way"
+        )
 
 
 def add_structures(

@@ -139,6 +139,32 @@ def test_wrong_maps_of_the_ground_are_named(tmp_path, option, values, message):
         strength(option, map_of(tmp_path / "m.asc", rupture, values))
 
 
+@pytest.mark.parametrize("option", ["--friction-map", "--turbulence-map"])
+def test_maps_of_other_places_are_named_by_their_option(tmp_path, option):
+    from fenics_bridge import terrain
+
+    _, rupture = strength()
+    values = np.full(rupture.values.shape, 100.0 if "turb" in option else 20.0)
+    shifted = terrain.Raster(rupture.x + 100.0, rupture.y, values)
+    terrain.write_raster(tmp_path / "m.asc", shifted)
+    with pytest.raises(mpm.InputError, match=f"{option}: .*m.asc covers x 62.5 to .* m, expected -37.5 to"):
+        strength(option, str(tmp_path / "m.asc"))
+    (tmp_path / "m.prj").write_text("EPSG:25832\n")
+    with pytest.raises(mpm.InputError, match=f"{option}: .*m.asc is in 'EPSG:25832', expected 'local' as the ground"):
+        strength(option, str(tmp_path / "m.asc"))
+
+
+def test_weak_coefficients_of_turbulence_are_doubted(tmp_path):
+    with pytest.warns(
+        RuntimeWarning, match="--turbulence is 5 m/s2, expected Voellmy's coefficient xi, some 100 to 2000 m/s2"
+    ):
+        _, rupture = strength("--turbulence", "5")
+    with pytest.warns(
+        RuntimeWarning, match="--turbulence-map has values from 0.5 m/s2, expected Voellmy's coefficient xi"
+    ):
+        strength("--turbulence-map", map_of(tmp_path / "t.asc", rupture, (0.5, 400)))
+
+
 def test_a_map_of_coefficients_is_doubted(tmp_path):
     _, rupture = strength()
     with pytest.warns(RuntimeWarning, match="--friction-map has values up to 0.4 only, which are angles in degrees"):
@@ -190,14 +216,37 @@ def test_places_and_structures_are_followed(tmp_path):
     assert "dam" in (folder / "summary.json").read_text()
 
 
+def read_structures(*paths):
+    _, rupture = strength()  # x -37.5 to 226.5 m, y -60 to 60 m
+    return importlib.import_module("common.runout_structures").read_structures(list(paths), rupture)
+
+
 def test_an_open_structure_and_two_of_one_name_are_refused(tmp_path):
-    structures = importlib.import_module("common.runout_structures")
     with pytest.raises(mpm.InputError, match="hole|has a border, expected a closed surface"):
-        structures.read_structures([box_file(tmp_path / "dam.stl", (0, 0, 0), (1, 1, 1), sides=3)])
+        read_structures(box_file(tmp_path / "dam.stl", (0, 0, 0), (1, 1, 1), sides=3))
     (tmp_path / "b").mkdir()
     twice = [box_file(folder / "wall.stl", (0, 0, 0), (1, 1, 1)) for folder in (tmp_path, tmp_path / "b")]
     with pytest.raises(mpm.InputError, match="--structure names two files wall"):
-        structures.read_structures(twice)
+        read_structures(*twice)
+
+
+@pytest.mark.parametrize("lower, upper, message", [
+    ((110, 10, 10), (100, 0, 0), "is inside out, expected triangles that run counterclockwise as seen from outside"),
+    ((5000, 0, 0), (5010, 10, 50), "--structure dam is at x 5000 to 5010 m, y 0 to 10 m, expected a place on the ground, x -37.5 to"),
+    ((100, 80, 0), (110, 90, 50), "--structure dam is at x 100 to 110 m, y 80 to 90 m, expected a place on the ground"),
+])  # fmt: skip
+def test_structures_that_are_inside_out_or_elsewhere_are_refused(tmp_path, lower, upper, message):
+    with pytest.raises(mpm.InputError, match=message):
+        read_structures(box_file(tmp_path / "dam.stl", lower, upper))
+
+
+@pytest.mark.parametrize("low, high, message", [
+    (50, 60, "--structure dam is .* m above the ground at least"), (-20, -10, "--structure dam is .* m below the ground at least"),
+])  # fmt: skip
+def test_structures_that_do_not_stand_in_the_ground_are_doubted(tmp_path, low, high, message):
+    with pytest.warns(RuntimeWarning, match=message):
+        read_structures(box_file(tmp_path / "dam.stl", (100, 0, low), (110, 10, high)))
+    assert list(read_structures(box_file(tmp_path / "dam.stl", (100, 0, -10), (110, 10, 60)))) == ["dam"]
 
 
 @pytest.mark.parametrize("words, message", [
