@@ -58,7 +58,7 @@ def read_places(path: Path, ground: Raster) -> Places:
             continue
         if len(row) != 3 or not np.isfinite(numbers).all() or not row[0].strip():
             raise mpm.InputError(
-                f"--places: line {number} of {path} is '{','.join(row)}', expected a name, x and y in metres"
+                f"--places: line {number} of {path} is '{','.join(row)}', expected a name, x and y in metres, divided by commas"
             )
         name = row[0].strip()
         if name in places.names:

@@ -173,6 +173,7 @@ def test_a_map_of_coefficients_is_doubted(tmp_path):
 
 @pytest.mark.parametrize("text, message", [
     ("house,10,0\nmill,5", "line 2 of .* is 'mill,5', expected a name, x and y in metres"),
+    ("house;10;0", "line 1 of .* is 'house;10;0', expected a name, x and y in metres, divided by commas"),
     ("house,10,0\nhouse,5,1", "line 2 of .* has the name 'house' again"),
     ("name,x,y\nhouse,1e4,0", "'house' is at x 10000 m, y 0 m, expected a place on the ground"),
     ("name,x,y\n", "has no places, expected a name, x and y"),
@@ -225,7 +226,7 @@ def test_an_open_structure_and_two_of_one_name_are_refused(tmp_path):
     with pytest.raises(mpm.InputError, match="hole|has a border, expected a closed surface"):
         read_structures(box_file(tmp_path / "dam.stl", (0, 0, 0), (1, 1, 1), sides=3))
     (tmp_path / "b").mkdir()
-    twice = [box_file(folder / "wall.stl", (0, 0, 0), (1, 1, 1)) for folder in (tmp_path, tmp_path / "b")]
+    twice = [box_file(folder / "wall.stl", (0, 0, 0), (1, 1, 100)) for folder in (tmp_path, tmp_path / "b")]
     with pytest.raises(mpm.InputError, match="--structure names two files wall"):
         read_structures(*twice)
 
