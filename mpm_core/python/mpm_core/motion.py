@@ -101,9 +101,9 @@ def read_acceleration(
     if unit is not None and unit not in UNITS:
         raise InputError(f"unit is {unit!r}, expected one of {', '.join(map(repr, UNITS))}")
     try:
-        with open(path, encoding="utf-8") as file:
+        with open(path, encoding="utf-8", errors="replace") as file:  # names of places in headers are in any encoding
             lines = file.read().splitlines()
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
         raise InputError(f"accelerogram {os.fspath(path)} cannot be read: {error}") from error
     if (header := _peer_header(lines)) is not None:
         time, values, unit = _peer_record(os.fspath(path), lines, header, unit)
@@ -141,17 +141,22 @@ _HEADERS = (
 )
 """The last line of the header of a PEER file: NPTS=  5000, DT=   .0100 SEC; older files have 5000  0.0100  NPTS, DT"""
 _HEADER_LINES = 10
-_IN_G = re.compile(r"UNITS OF G\b|\(G'?S?\)|\bIN G\b", re.IGNORECASE)
+_IN_UNIT = {
+    "g": re.compile(r"UNITS OF G\b|\(G'?S?\)|\bIN G\b", re.IGNORECASE),
+    "cm/s2": re.compile(r"\bCM/S(EC)?(/S(EC)?|\^?2|\*\*2)", re.IGNORECASE),
+}
 
 
 def says_its_unit(path: str | os.PathLike[str]) -> bool:
     """Whether an accelerogram is a PEER file whose header has the unit of the accelerations; False where it cannot be read."""
     try:
-        with open(path, encoding="utf-8") as file:
+        with open(path, encoding="utf-8", errors="replace") as file:
             lines = [line for line, _ in zip(file, range(_HEADER_LINES))]
-    except (OSError, UnicodeDecodeError):
+    except OSError:
         return False
-    return _peer_header(lines) is not None and any(_IN_G.search(line) for line in lines)
+    return _peer_header(lines) is not None and any(
+        pattern.search(line) for line in lines for pattern in _IN_UNIT.values()
+    )
 
 
 def _peer_header(lines: list[str]) -> tuple[int, int, float] | None:
@@ -173,7 +178,7 @@ def _peer_record(
         raise InputError(
             f"accelerogram {path} has velocities or displacements by its header, expected accelerations (.AT2)"
         )
-    own = "g" if _IN_G.search(said) else unit
+    own = next((name for name, pattern in _IN_UNIT.items() if pattern.search(said)), unit)
     if own is None:
         raise InputError(f"unit is None, expected that of accelerogram {path}, whose header does not name it")
     if unit not in (None, own):

@@ -285,6 +285,15 @@ def test_wrong_files_of_the_peer_database_are_named(tmp_path, change, unit, mess
         mpm.read_acceleration(path, unit=unit)
 
 
+def test_headers_of_peer_files_in_other_units_and_encodings(tmp_path):
+    text = PEER.format(last="NPTS=     7, DT=   .0050 SEC,").replace("UNITS OF G", "UNITS OF CM/S/S")
+    path = tmp_path / "RSN1.AT2"
+    path.write_bytes(text.replace("Nowhere", "Erzincan Yöresi").encode("latin-1"))
+    assert mpm.read_acceleration(path)[1][2] == pytest.approx(0.01 * 0.3)
+    with pytest.raises(mpm.InputError, match="unit is 'g', expected 'cm/s2' as the header of accelerogram"):
+        mpm.read_acceleration(path, unit="g")
+
+
 def test_columns_divided_by_semicolons_may_have_decimal_commas(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("# t; a\n0,00;1,5\n0,01;-2,5\n")
