@@ -6,11 +6,13 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
+from dolfinx.mesh import exterior_facet_indices
 from mpm_core.input_warnings import fast_flow
 
 import fenics_bridge as bridge
 from fenics_bridge import water
-from fenics_bridge.compat import cell_dofs
+from fenics_bridge.compat import cell_dofs, cell_nodes, facet_nodes
+from fenics_bridge.fem.supports import tagged_facets
 
 from .checks import say
 
@@ -43,9 +45,57 @@ def warn_of_reservoirs(domain: Any, boundary: Iterable[Any], path: Any) -> None:
     """Warn of reservoirs of the file at a path that are far above a mesh. Collective."""
     for condition in boundary:
         if isinstance(condition, water.Reservoir):
-            given = np.asarray(condition.level, dtype=float)
-            levels = given[:, 1] if given.ndim else given[None]
-            warn_of_depth(domain, levels.tolist(), f"{path}: the reservoir of {condition.facet_tag!r}")
+            warn_of_depth(domain, levels_of(condition), f"{path}: the reservoir of {condition.facet_tag!r}")
+
+
+def levels_of(reservoir: water.Reservoir) -> list[float]:
+    """Its levels over time [m]."""
+    given = np.asarray(reservoir.level, dtype=float)
+    levels: list[float] = (given[:, 1] if given.ndim else given[None]).tolist()
+    return levels
+
+
+def warn_of_flooded_ground(domain: Any, facet_tags: Any, boundary: Iterable[Any], path: Any) -> None:
+    """Warn of ground beside a reservoir that is lower than its level, but dry: a crest that is overtopped, or a floor that is left out.
+
+    Collective.
+
+    Args:
+        domain, facet_tags: of a plane section.
+        boundary: boundary conditions of the water.
+        path: of the file.
+    """
+    reservoirs = [condition for condition in boundary if isinstance(condition, water.Reservoir)]
+    if not reservoirs:
+        return
+    wet = [tagged_facets(domain.comm, facet_tags, condition.facet_tag, "boundary") for condition in reservoirs]
+    dry = upward_facets(domain, np.setdiff1d(exterior_facet_indices(domain.topology), np.concatenate(wet)))
+    dry = np.concatenate(domain.comm.allgather(dry))
+    for condition, facets in zip(reservoirs, wet, strict=True):
+        level = max(levels_of(condition))
+        ends = np.concatenate(
+            domain.comm.allgather(domain.geometry.x[facet_nodes(domain, facets)][:, :, :2].reshape(-1, 2))
+        )
+        beside = (np.linalg.norm(dry[:, :, None] - ends, axis=-1).min(axis=-1, initial=np.inf) == 0).any(axis=1)
+        low = beside & (dry[:, :, 1].max(axis=1, initial=-np.inf) < level)
+        if low.any():
+            x, y = dry[low][0].mean(axis=0)
+            say(f"{path}: the reservoir of {condition.facet_tag!r} rises to {level:g} m, above the ground beside it at x = {x:.4g} m, y = {y:.4g} m, "
+                "which is not part of a reservoir: no water stands on it or enters there; lower the level, or give that boundary a reservoir")  # fmt: skip
+
+
+def upward_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
+    """Ends of those of some facets at the border of a plane section that soil is below of [m], shape (k, 2, 2)."""
+    topology = domain.topology
+    topology.create_connectivity(1, 2)
+    cells = [topology.connectivity(1, 2).links(facet)[0] for facet in facets.astype(np.int32)]
+    ends = domain.geometry.x[facet_nodes(domain, facets.astype(np.int32))][:, :, :2].reshape(-1, 2, 2)
+    soil = domain.geometry.x[cell_nodes(domain)[cells]][:, :, :2].reshape(-1, 3, 2).mean(axis=1)
+    along, inwards = ends[:, 1] - ends[:, 0], soil - ends[:, 0]
+    normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    normal *= -np.sign((normal * inwards).sum(axis=1))[:, None]
+    upward: np.ndarray = ends[normal[:, 1] > 1e-6 * np.linalg.norm(along, axis=1)]
+    return upward
 
 
 def warn_of_suction(flow: water.Seepage, soils: Mapping[str, water.PorousSoil], cell_tags: Any, path: Any) -> bool:

@@ -22,7 +22,7 @@ from fenics_bridge.water.boundary import value_at
 from fenics_bridge.water.soils import WATER_WEIGHT
 
 from .checks import say
-from .site_doubts import warn_of_reservoirs
+from .site_doubts import warn_of_flooded_ground, warn_of_reservoirs
 from .site_file import CHANGES, Site, site_of, warn_of_pressures
 from .site_keys import changes_of
 from .water_site import boundary_of, corners_of, effective_laws, read_water_table, times_of, wet_soils
@@ -132,6 +132,7 @@ def read_slope_site(path: Path, comm: MPI.Comm, cell_size: float | None = None, 
     site = site_of(effective_laws(table), path, comm, cell_size)
     body = site.body()
     warn_of_reservoirs(body[0], boundary, path)
+    warn_of_flooded_ground(body[0], body[2], boundary, path)
     return SlopeSite(site, porous, boundary, body)
 
 

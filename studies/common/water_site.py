@@ -30,7 +30,7 @@ import mpm_core as mpm
 from fenics_bridge import water
 
 from .checks import say
-from .site_doubts import warn_of_flow, warn_of_reservoirs
+from .site_doubts import warn_of_flooded_ground, warn_of_flow, warn_of_reservoirs
 from .site_file import Site, check_soils, part_of_mesh, site_mesh
 from .site_keys import CONDITIONS, CURVES, DAY, FLOW, UNDRAINED, changes_of, part_of, read_site_table
 
@@ -121,6 +121,7 @@ def read_water_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) 
     wet = {name: soil for name, soil in soils.items() if soil is not None}
     boundary, body = list(boundary_of(table, path).values()), part_of_mesh(mesh, wet)
     warn_of_reservoirs(body[0], boundary, path)
+    warn_of_flooded_ground(body[0], body[2], boundary, path)
     return WaterSite(*body, wet, boundary, varies=bool(times_of(boundary)))
 
 

@@ -1,6 +1,7 @@
 """The study seepage: its site files, and the flow that it reports."""
 
 import json
+import re
 import sys
 import warnings
 from pathlib import Path
@@ -153,6 +154,45 @@ def test_water_that_falls_over_level_ground_presses_none_out_of_it(tmp_path):
     pressure, area = 9810.0 * 5.0, 4.0 * 2.0
     assert 0 <= left < 0.01 * 1e-7 * pressure * area  # m_v w would leave if the skeleton took the load
     assert left == pytest.approx(0.4 / 2.2e9 * pressure * area, rel=0.15)
+
+
+@pytest.mark.parametrize("level, said", [(10.0, ""), (12.0, ""), (13.0, "x = 2[4-8][.0-9]* m, y = 12 m")])
+def test_a_crest_that_is_overtopped_is_said(level, said, tmp_path):
+    """The crest of the dam, 12 m high from x = 24 to 28 m, is no part of the reservoir."""
+    text = SITE.replace(
+        "reservoir = [[0.0, 10.0], [10.0, 10.0], [15.0, 3.0]]", f"reservoir = [[0.0, 3.0], [10.0, {level}]]"
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        read(text, tmp_path)
+    found = [str(one.message) for one in caught if "above the ground beside it" in str(one.message)]
+    assert bool(found) == bool(said)
+    if said:
+        assert re.search(
+            f"the reservoir of 'upstream' rises to {level:g} m, above the ground beside it at {said}", found[0]
+        )
+
+
+def test_a_floor_that_a_reservoir_leaves_out_is_said(tmp_path):
+    """Water stands on a slope from (4, 3) to (10, 0) up to 2 m, but not on the level ground before its toe."""
+    from common.water_site import read_water_site
+
+    lines = ["Point(1) = {0, -2, 0}; Point(2) = {14, -2, 0}; Point(3) = {14, 0, 0}; Point(4) = {10, 0, 0}; Point(5) = {4, 3, 0};",
+             "Point(6) = {0, 3, 0};", *(f"Line({k}) = {{{k}, {k % 6 + 1}}};" for k in range(1, 7)), "Curve Loop(1) = {1:6};",
+             'Plane Surface(1) = {1}; Physical Surface("clay") = {1};', 'Physical Curve("slope") = {4};',
+             'Physical Curve("floor") = {3};', "Mesh.MeshSizeMax = 1;"]  # fmt: skip
+    (tmp_path / "slope.geo").write_text("\n".join(lines) + "\n")
+    site = 'mesh = "slope.geo"\n[soils.clay]\nconductivity = 1e-9\nporosity = 0.4\ncompressibility = 1e-7\n[boundaries.slope]\nreservoir = 2.0\n'
+    (tmp_path / "one.toml").write_text(site)
+    (tmp_path / "both.toml").write_text(site + "[boundaries.floor]\nreservoir = 2.0\n")
+    with pytest.warns(
+        RuntimeWarning,
+        match="reservoir of 'slope' rises to 2 m, above the ground beside it at x = 10[.0-9]* m, y = 0 m",
+    ):
+        read_water_site(tmp_path / "one.toml", MPI.COMM_WORLD)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read_water_site(tmp_path / "both.toml", MPI.COMM_WORLD)
 
 
 def test_no_film_writes_none(tmp_path):
