@@ -67,9 +67,9 @@ def ngamma(friction: float, size: float) -> float:
     )
     supports = [bridge.roller(AXIS, (1, 0)), bridge.roller(FAR, (1, 0)), bridge.fixed(BASE),
                 bridge.prescribed(FOOTING, (0.0, -0.02))]  # fmt: skip
-    model = bridge.QuasiStatic(
-        domain, soil, facet_tags, supports, degree=2, solver=bridge.Solver(relaxed_tolerance=5e-5)
-    )
+    # Of 30 degrees the sand at the edge flows on under 1e-4 of the forces; of 20 degrees the factor depends on the tolerance by 3 %.
+    solver = bridge.Solver(relaxed_tolerance=5e-5 if friction > 25 else 1e-5)
+    model = bridge.QuasiStatic(domain, soil, facet_tags, supports, degree=2, solver=solver)
     at_rest = bridge.k0_stress(model.points.coordinates(), surface=0.0, unit_weight=UNIT_WEIGHT, k0=0.5)
     model.set_initial_stress(at_rest, bridge.Load(unit_weight=UNIT_WEIGHT, displacement=0.0))
 
