@@ -261,11 +261,12 @@ def row(a: Namespace, wall: mpm.RigidContact, history: History, report: mpm.Repo
     # Cohesion acts as a surcharge c cot(phi) that the wall feels too (corresponding states, Caquot 1934).
     surcharge = a.cohesion / np.tan(np.radians(a.friction_angle)) * a.height / unit_force(a)
     push = -mean_force(history, wall, report.time, 0)
+    normal = push + surcharge * unit_force(a)  # the strength of the wall is (sigma + c cot phi) tan delta
     drag = mean_force(history, wall, report.time, 1, "vertical_impulse_Ns")
     return {
         "time_s": report.time, "wall_displacement_m": wall.displacement[0],
         "coefficient": (push / unit_force(a) + surcharge) / (1 + surcharge), "impulse_Ns": wall.impulse[0],
-        "vertical_impulse_Ns": wall.impulse[1], "wall_friction": abs(drag) / push if push > 0 else 0.0,
+        "vertical_impulse_Ns": wall.impulse[1], "wall_friction": abs(drag) / normal if normal > 0 else 0.0,
         "unexplained_fraction_of_energy": report.unexplained_fraction, "dt_s": report.dt,
     }  # fmt: skip
 

@@ -152,3 +152,13 @@ def test_sand_that_dilates_little_has_another_coefficient_behind_rough_walls():
 def test_sand_that_heaves_before_a_wall_is_said(options, said, recwarn):
     importlib.import_module("wall").parse(["--motion", *options.split()])
     assert any("the sand heaves before the wall" in str(one.message) for one in recwarn) == said
+
+
+def test_the_friction_of_sand_with_cohesion_is_that_of_its_wall(tmp_path):
+    """The wall's strength is (sigma + c cot phi) tan delta: over sigma alone it seemed to mobilise 40 of its 20 degrees."""
+    wall = importlib.import_module("wall")
+    options = "--cohesion 1e3 --wall-friction-angle 20 --cell-size 0.1 --no-film --no-pictures"
+    assert wall.main([*options.split(), "--output", str(tmp_path / "there")]) == 0
+    summary = json.loads((tmp_path / "there" / "summary.json").read_text())
+    assert 10 < summary["wall_friction_angle_in_the_end_degrees"] < 20.5
+    assert 0.9 * summary["coefficient_by_stress_field"] < summary["coefficient_in_the_end"] < 0.33
