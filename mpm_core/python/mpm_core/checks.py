@@ -45,7 +45,7 @@ def real_numbers(name: str, values: Any) -> NDArray[np.float64]:
     except ValueError:  # rows of different lengths
         is_real = False
     if not is_real:
-        raise InputError(f"{name} is {_shown(values)}, expected real numbers")
+        raise InputError(f"{name} is {shown(values)}, expected real numbers")
     return array.astype(np.float64, order="C")
 
 
@@ -57,7 +57,8 @@ def at_points(name: str, values: Any, count: int) -> NDArray[np.float64]:
     return np.array(np.broadcast_to(array, count))
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
+    """A value as errors show it, cut off where it is long."""
     text = repr(value)
     return text if len(text) <= 100 else f"{text[:97]}..."
 

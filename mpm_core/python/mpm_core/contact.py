@@ -195,7 +195,7 @@ def refuse_contacts(model: Model, scheme: str) -> None:
 def refuse_drag(model: Model, scheme: str) -> None:
     """Raises InputError where a scheme would leave out the resistance that grows with velocity."""
     for entry in model._contacts:
-        if largest(entry.get("drag", 0.0)) > 0:
+        if largest(entry["drag"]) > 0:
             raise InputError(f"drag of the {entry['surface']['kind']} is above 0, which {scheme} does not support")
 
 

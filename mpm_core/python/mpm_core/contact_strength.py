@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import InputError
-from .checks import positive
+from .checks import positive, shown
 from .mesh import floats
 from .surfaces import Polyline, Surface
 from .triangles import Triangles
@@ -36,7 +36,7 @@ def _checked(name: str, value: ArrayLike, surface: Surface) -> NDArray[np.float6
     parts, kind = _parts(surface)
     if not parts:
         raise InputError(
-            f"{name} is {_shown(value)}, expected a number; one for each part is possible on a Polyline or on Triangles"
+            f"{name} is {shown(value)}, expected a number; one for each part is possible on a Polyline or on Triangles"
         )
     array = floats(name, value, (None,))
     if len(array) != parts:
@@ -54,11 +54,6 @@ def _parts(surface: Surface) -> tuple[int, str]:
     if isinstance(surface, Polyline):
         return len(np.asarray(surface.points)) - (0 if surface.closed else 1), "segments"
     return 0, ""
-
-
-def _shown(value: ArrayLike) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def described_strength(surface: Surface, strength: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
@@ -96,14 +91,14 @@ def largest(described: float | dict[str, Any]) -> float:
 
 def is_rough(entry: dict[str, Any]) -> bool:
     """Whether anything resists sliding on a surface."""
-    return any(largest(entry.get(name, 0.0)) > 0 for name in UNITS)
+    return any(largest(entry[name]) > 0 for name in UNITS)
 
 
 def strength_of(model: Model, entry: dict[str, Any]) -> NDArray[np.float64]:
     """Friction, adhesion and drag of a surface, shape (1 or parts, 3)."""
     columns = []
     for name in UNITS:
-        described = entry.get(name, 0.0)  # files of older versions have no drag
+        described = entry[name]
         columns.append(_values(model, described) if isinstance(described, dict) else np.array([described]))
     return np.stack(np.broadcast_arrays(*columns), axis=1)
 
@@ -119,7 +114,7 @@ def _values(model: Model, described: dict[str, Any]) -> NDArray[np.float64]:
 def strength_text(entry: dict[str, Any]) -> str:
     """The strength of a surface in words."""
     texts = [f"friction {_range(entry['friction'])}", f"adhesion {_range(entry['adhesion'])} Pa"]
-    if largest(entry.get("drag", 0.0)) > 0:
+    if largest(entry["drag"]) > 0:
         texts.append(f"drag {_range(entry['drag'])}")
     return ", ".join(texts)
 
@@ -132,7 +127,7 @@ def require_strengths(model: Model, contacts: list[dict[str, Any]]) -> None:
     """Raises InputError where the model does not have the values by part of a surface in a checkpoint."""
     for entry in contacts:
         for name in UNITS:
-            described = entry.get(name, 0.0)
+            described = entry[name]
             known = not isinstance(described, dict) or "values" in described
             if not known and described["fingerprint"] not in model._values_of_parts:
                 raise InputError(

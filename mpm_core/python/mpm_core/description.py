@@ -40,6 +40,7 @@ def parsed(path: str, text: bytes) -> dict[str, Any]:
         raise RunError(
             f"cannot read checkpoint {path}: prescribed in its description names supports that are not there"
         )
+    there["contacts"] = [{"drag": 0.0, **contact} for contact in there["contacts"]]  # older files have none
     return there
 
 
