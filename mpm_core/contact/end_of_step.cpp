@@ -127,12 +127,12 @@ template <int D>
 LongestSlip longest_slip(const Resistance& strength, const Spring& spring, const WaterShare& water, double overlap,
                          const EndTouch<D>& touch)
 {
-  const double part = covered_part(spring.radius - overlap * spring.onset, spring.radius);
-  const double rises = 1 / (1 + std::exp(-overlap));                  // d depth / d overlap
-  const double stuck = strength.adhesion * touch.area / spring.shear; // slip at which adhesion alone gives way
+  const double rises = 1 / (1 + std::exp(-overlap));                       // d depth / d overlap
+  const double adheres = strength.adhesion / spring.shear;                 // slip at which adhesion gives way, per area
+  const bool partly = 0 < touch.covered && touch.covered < 2 * touch.area; // where that area changes with the gap
   const double per_depth = strength.friction * spring.stiffness / spring.shear, grains = carried_by_grains(water);
-  return {per_depth * grains * touch.depth + stuck * part,
-          per_depth * grains * rises + (part > 0 && part < 2 ? stuck / spring.radius : 0),
+  return {per_depth * grains * touch.depth + adheres * touch.covered,
+          per_depth * grains * rises + (partly ? adheres * touch.area / spring.radius : 0),
           grains > 0 ? -per_depth * touch.depth * water.per_pressure : 0};
 }
 
