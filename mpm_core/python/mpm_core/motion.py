@@ -147,6 +147,12 @@ _IN_UNIT = {
 }
 
 
+def _unit_in(header: list[str]) -> str | None:
+    """The unit of accelerations that a header names, if any."""
+    said = " ".join(header)
+    return next((unit for unit, pattern in _IN_UNIT.items() if pattern.search(said)), None)
+
+
 def says_its_unit(path: str | os.PathLike[str]) -> bool:
     """Whether an accelerogram is a PEER file whose header has the unit of the accelerations; False where it cannot be read."""
     try:
@@ -154,9 +160,8 @@ def says_its_unit(path: str | os.PathLike[str]) -> bool:
             lines = [line for line, _ in zip(file, range(_HEADER_LINES))]
     except OSError:
         return False
-    return _peer_header(lines) is not None and any(
-        pattern.search(line) for line in lines for pattern in _IN_UNIT.values()
-    )
+    header = _peer_header(lines)
+    return header is not None and _unit_in(lines[: header[0]]) is not None
 
 
 def _peer_header(lines: list[str]) -> tuple[int, int, float] | None:
@@ -178,7 +183,7 @@ def _peer_record(
         raise InputError(
             f"accelerogram {path} has velocities or displacements by its header, expected accelerations (.AT2)"
         )
-    own = next((name for name, pattern in _IN_UNIT.items() if pattern.search(said)), unit)
+    own = _unit_in(lines[:last]) or unit
     if own is None:
         raise InputError(f"unit is None, expected that of accelerogram {path}, whose header does not name it")
     if unit not in (None, own):
