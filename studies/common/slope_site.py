@@ -25,7 +25,7 @@ from .checks import say
 from .site_doubts import warn_of_flooded_ground, warn_of_reservoirs
 from .site_file import CHANGES, Site, site_of, warn_of_pressures
 from .site_keys import changes_of
-from .water_site import boundary_of, corners_of, effective_laws, read_water_table, times_of, wet_soils
+from .water_site import boundary_of, corners_of, effective_laws, read_water_table, standing_load, times_of, wet_soils
 
 
 @dataclass
@@ -53,8 +53,7 @@ class SlopeSite:
         Collective.
         """
         domain, _, facet_tags = self.body
-        any_there = any(isinstance(condition, water.Reservoir) for condition in self.boundary)
-        return water.standing_water(domain, facet_tags, self.boundary) if any_there else None
+        return standing_load(domain, facet_tags, self.boundary)
 
     def ground(self) -> list[tuple]:
         """Reservoirs, each with a line of the ground below it, of which it may have several: (condition, x, y). Collective."""

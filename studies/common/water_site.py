@@ -17,7 +17,7 @@ Example of a file:
 
 from __future__ import annotations
 
-from collections.abc import Collection, Container, Iterable, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -51,10 +51,7 @@ class WaterSite:
 
     def seepage(self, degree: int) -> water.Seepage:
         """The flow, at rest, in elements of a degree; reservoirs that change load the soil as well. Collective."""
-        standing = any(isinstance(condition, water.Reservoir) for condition in self.boundary)
-        loading = (
-            water.standing_water(self.domain, self.facet_tags, self.boundary) if self.varies and standing else None
-        )
+        loading = standing_load(self.domain, self.facet_tags, self.boundary) if self.varies else None
         return water.Seepage(
             self.domain,
             self.soils,
@@ -64,6 +61,12 @@ class WaterSite:
             degree=degree,
             loading=loading,
         )
+
+
+def standing_load(domain: Any, facet_tags: Any, boundary: Sequence[Any]) -> Callable | None:
+    """Pressure of the water on the ground by positions and time, as of `standing_water`; None without a reservoir. Collective."""
+    any_there = any(isinstance(condition, water.Reservoir) for condition in boundary)
+    return water.standing_water(domain, facet_tags, boundary) if any_there else None
 
 
 def times_of(boundary: Iterable[Any]) -> set[float]:
