@@ -73,10 +73,10 @@ def warn_of_flooded_ground(domain: Any, facet_tags: Any, boundary: Iterable[Any]
     dry = np.concatenate(domain.comm.allgather(dry))
     for condition, facets in zip(reservoirs, wet, strict=True):
         level = max(levels_of(condition))
-        ends = np.concatenate(
-            domain.comm.allgather(domain.geometry.x[facet_nodes(domain, facets)][:, :, :2].reshape(-1, 2))
-        )
-        beside = (np.linalg.norm(dry[:, :, None] - ends, axis=-1).min(axis=-1, initial=np.inf) == 0).any(axis=1)
+        ends = np.concatenate(domain.comm.allgather(domain.geometry.x[facet_nodes(domain, facets)].reshape(-1, 3)))
+        beside = np.isin(dry @ (1, 1j), ends[:, :2] @ (1, 1j)).any(
+            axis=1
+        )  # nodes by their coordinates, as complex numbers
         low = beside & (dry[:, :, 1].max(axis=1, initial=-np.inf) < level)
         if low.any():
             x, y = dry[low][0].mean(axis=0)
