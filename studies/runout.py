@@ -25,6 +25,7 @@ from common.lengths import metres
 from common.options import add_choice, add_count, add_number, check, study_parser
 from common.output_options import add_picture_options
 from common.progress import Progress
+from common.quiet import without_warning
 from common.ranks import run_study
 from common.results import open_results
 from common.runout_ground import add_ground_options, check_ground, ground_strength
@@ -211,7 +212,8 @@ def build(a: Namespace, before: terrain.Raster, rupture: terrain.Raster) -> tupl
     )  # fmt: skip
     model = mpm.Model(bridge.background_mesh(domain, facet_tags=facet_tags), law_of(a))
     strength = ground_strength(a, rupture)
-    ground, lift = terrain.seed_slide(model, before, rupture, spacing=a.spacing, density=a.density, **strength)
+    with without_warning("drag is"):  # said of --turbulence
+        ground, lift = terrain.seed_slide(model, before, rupture, spacing=a.spacing, density=a.density, **strength)
     model.outflow("sides")
     model.set_gravity((0.0, 0.0, -9.81))
     model.rebalance()

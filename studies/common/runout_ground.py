@@ -6,16 +6,15 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 import numpy as np
-from mpi4py import MPI
 
 import mpm_core as mpm
 from fenics_bridge.terrain import Raster, read_raster
+from fenics_bridge.terrain.raster import TIFF
 from fenics_bridge.terrain.slide import require_cover
 
 from .checks import check_effect, check_file, say
 from .options import add_number
-
-GRAVITY = 9.81
+from .slope_case import GRAVITY
 
 
 def add_ground_options(parser: ArgumentParser) -> None:
@@ -62,10 +61,7 @@ def ground_strength(a: Namespace, ground: Raster) -> dict[str, float | Raster]:
             raise mpm.InputError(
                 f"--friction-map has values of {low:g} to {high:g}, expected angles from 0 to below 90 degrees"
             )
-        if MPI.COMM_WORLD.rank == 0:
-            say(
-                f"--friction-map has values up to {high:g} only, which are angles in degrees" if 0 < high <= 1.5 else ""
-            )
+        say(f"--friction-map has values up to {high:g} only, which are angles in degrees" if 0 < high <= 1.5 else "")
         friction = _mapped(angles, (1 - a.pore_pressure_ratio) * np.tan(np.radians(angles.values)))
     if a.turbulence_map is not None:
         turbulence = read_map("--turbulence-map", a.turbulence_map, ground)
@@ -95,7 +91,7 @@ def read_map(name: str, path: Path, ground: Raster) -> Raster:
     Raises:
         InputError: it cannot be read, or does not cover the ground.
     """
-    names_its_own = path.with_suffix(".prj").is_file() or path.suffix.lower() in (".tif", ".tiff")
+    names_its_own = path.with_suffix(".prj").is_file() or path.suffix.lower() in TIFF
     try:
         raster = read_raster(path, crs=None if names_its_own else ground.crs)
         require_cover(str(path), raster, ground)
