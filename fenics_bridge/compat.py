@@ -184,6 +184,12 @@ def interpolation_points(space: Any) -> NDArray[np.float64]:
     return points() if callable(points) else points
 
 
+def degree_of(space: Any) -> int:
+    """Degree of a Lagrange space."""
+    degree = space.ufl_element().degree
+    return int(degree() if callable(degree) else degree)
+
+
 def cell_dofs(space: Any) -> NDArray[np.int32]:
     """Blocked degrees of freedom of each cell on this rank, ghosts last: (m, k)."""
     dofs = space.dofmap.list

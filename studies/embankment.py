@@ -27,7 +27,6 @@ from common.results import open_results
 from common.scenes import scene_of
 from common.site_file import Site, read_site
 from common.site_slides import add_strength_factor
-from common.stage_plots import stage_pictures
 from common.stage_runs import add_stage_options, carry_out
 from common.summary import write_summary
 from mpi4py import MPI
@@ -119,10 +118,11 @@ def main(arguments: list[str] | None = None) -> int:
     site = read_site(a.site, comm, a.cell_size, needed=("stages",))
     folder = open_results(a, comm)
     degree, averaged = int(a.elements[1]), site_slides.averages(a, site.laws.values())
-    staged, rows, pictures, failed = carry_out(site, degree, folder, comm, nmd=averaged and degree == 1)
+    run = carry_out(site, degree, folder, comm, nmd=averaged and degree == 1)
+    failed, rows = run.stopped, run.rows
     built = perf_counter()
     particles, failed_particles = build(site, a.particles_per_cell, a.factor, averaged)
-    apart = stress_difference(particles, staged) if not (failed or failed_particles) else None
+    apart = stress_difference(particles, run.site) if not (failed or failed_particles) else None
     model = particles.model
     model.particles.set("initial_position", model.particles.position)
     factor = 1.0 if failed_particles else a.factor
@@ -141,7 +141,7 @@ def main(arguments: list[str] | None = None) -> int:
         "wall_seconds": {"stages_fem": built - start, "all": perf_counter() - start},
     }  # fmt: skip
     drawn = {
-        **(stage_pictures(site.stages, rows, pictures, folder) if a.pictures else {}),
+        **(run.drawn(site.stages, folder) if a.pictures else {}),
         **site_slides.slide_pictures(a, result, scene, folder),
     }
     slide = f"strength divided by {factor:g}" if factor > 1 else "full strength"

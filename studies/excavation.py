@@ -12,13 +12,13 @@ from argparse import ArgumentParser, Namespace
 from time import perf_counter
 
 import numpy as np
+from common.member_results import captions
 from common.options import add_switch, study_parser
 from common.page import Page
 from common.quiet import NOT_REACHED, without_warning
 from common.ranks import run_study
 from common.results import open_results
 from common.site_file import Site, read_site
-from common.stage_plots import stage_pictures
 from common.stage_runs import add_stage_options, carry_out
 from common.summary import write_summary
 from mpi4py import MPI
@@ -41,7 +41,12 @@ def parser() -> ArgumentParser:
     """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_stage_options(p, "excavation", "P2")
-    add_switch(p, "--compare", True, "also compute elastic soil, and the final geometry in one stage, for comparison")
+    add_switch(
+        p,
+        "--compare",
+        True,
+        "also compute elastic soil, and the final geometry in one stage, for comparison; without members",
+    )
     return p
 
 
@@ -94,23 +99,22 @@ def main(arguments: list[str] | None = None) -> int:
     start = perf_counter()
     site = read_site(a.site, comm, a.cell_size, needed=("stages",))
     folder = open_results(a, comm)
-    staged, rows, pictures, stopped = carry_out(site, int(a.elements[1]), folder, comm)
-    compared = comparison(site, staged) if a.compare and stopped is None else {}
-    last = rows[-1] if rows else {}
+    run = carry_out(site, int(a.elements[1]), folder, comm)
+    compared = comparison(site, run.site) if a.compare and run.stopped is None and not site.members else {}
+    last = run.rows[-1] if run.rows else {}
     summary = {
-        "finished_run": stopped is None, "stopped_because": stopped,
+        "finished_run": run.stopped is None, "stopped_because": run.stopped,
         **{f"last_{key}": last.get(key) for key in ("heave_m", "settlement_m", "sideways_m")}, **compared,
-        "stages": [{"stage": row["stage"], **{k: v for k, v in row.items() if k != "stage"}} for row in rows],
+        "stages": [{"stage": row["stage"], **{k: v for k, v in row.items() if k != "stage"}} for row in run.rows],
         "wall_seconds": perf_counter() - start,
     }  # fmt: skip
-    captions = {"stages_displacement": "The soil after each stage, by its displacement, with the water table where there is one",
+    shown = {"stages_displacement": "The soil after each stage, by its displacement, with the water table where there is one",
                 "stages_strain": "The soil after each stage, by the strain accumulated since the displacements were reset",
-                "movements": "Largest movements after each stage"}  # fmt: skip
+                "movements": "Largest movements after each stage", **captions(run.forces)}  # fmt: skip
     said = "\n".join(
         COMPARED[name].format(value) if value is not None else NOT_CARRIED for name, value in compared.items()
     )
-    drawn = stage_pictures(site.stages, rows, pictures, folder)
-    return write_summary(folder, a, summary, comm, Page(captions=captions), drawn, said)
+    return write_summary(folder, a, summary, comm, Page(captions=shown), run.drawn(site.stages, folder), said)
 
 
 if __name__ == "__main__":

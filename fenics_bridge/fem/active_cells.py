@@ -35,7 +35,9 @@ def switch_off(model: Any) -> None:
     model.points.assign(np.full(owned_cells(model.domain), -1, dtype=np.int32), len(model.laws))
 
 
-def reconfigure(model: Any, off: Any, supports: Any, pore_pressure: Any, stress: Any, law: Any) -> None:
+def reconfigure(
+    model: Any, off: Any, supports: Any, pore_pressure: Any, stress: Any, law: Any, members: Any = None
+) -> None:
     """Apply the changes of `QuasiStatic.reconfigure`."""
     domain, points, before = model.domain, model.points, model.laws
     off = model.off if off is None else off
@@ -52,15 +54,14 @@ def reconfigure(model: Any, off: Any, supports: Any, pore_pressure: Any, stress:
     take_over(model, new, laws, before, given)
     model.law, model.off = law, off
     _support(model, model.supports if supports is None else tuple(supports), there)
-    space = model.displacement.function_space
-    model._loads = LoadVectors(
-        space, model.facet_tags, model.cell_tags, active=there if off else None, radius=model.radius
-    )
+    space, active = model.displacement.function_space, there if off else None
+    model._loads = LoadVectors(space, model.facet_tags, model.cell_tags, active=active, radius=model.radius)
+    model._change_members(model.members if members is None else members)
     model._water = water
     if water is not None:
         model._loads.constant = _seepage_forces(space, water, there, model.radius)
     old = replace(model._loads.resolved(model.load), displacement=0.0, held=0.0)
-    model._loads.held = model._kinematics.internal_forces(points.stress).array - model._loads.forces(old)
+    model._loads.held = model._internal_forces() - model._loads.forces(old)
     model.load = replace(old, held=1.0)
 
 

@@ -11,6 +11,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fenics_bridge import compat
 from fenics_bridge.fem.missing_stress import missing_fraction
 from fenics_bridge.types import Law
 
@@ -31,20 +32,36 @@ class Body:
     """Constraints on the unknowns"""
     solver: Any
     """Solver of linear systems"""
+    members: Any = None
+    """Structural members, `structures.installed.Members`; None where there can be none"""
+
+    def internal_forces(self, stress: NDArray[np.float64]) -> Any:
+        """Nodal forces of a stress (n, S) and of the members at the end of the step, ghosts up to date. Collective."""
+        forces = self.kinematics.internal_forces(stress)
+        if self.members:
+            of_members = self.members.forces()
+            forces.array[: len(of_members)] += of_members
+            compat.forward(forces)
+        return forces
 
     def accept(self) -> None:
         """Accept the end of the step as the state that the next step starts from."""
         self.points.accept()
+        if self.members:
+            self.members.accept()
         self.solution.x.array[:] += self.increment.x.array
 
-    def snapshot(self) -> tuple[Any, Any]:
+    def snapshot(self) -> tuple[Any, Any, Any]:
         """Copies of the state that the next step starts from, for `restore`."""
-        return self.solution.x.array.copy(), self.points.snapshot()
+        of_members = self.members.snapshot() if self.members else None
+        return self.solution.x.array.copy(), self.points.snapshot(), of_members
 
-    def restore(self, snapshot: tuple[Any, Any]) -> None:
+    def restore(self, snapshot: tuple[Any, Any, Any]) -> None:
         """Restore a state that was copied before."""
         self.solution.x.array[:] = snapshot[0]
         self.points.restore(snapshot[1])
+        if self.members:
+            self.members.restore(snapshot[2])
 
 
 class EquilibriumStep:
@@ -96,6 +113,7 @@ class EquilibriumStep:
         spread = self._body.kinematics.strain_increment()
         points.update(self._laws, np.zeros_like(spread))
         points.add_viscosity(self._laws, self._viscosity, np.zeros_like(spread))
+        self._follow_members(as_elastic=True)
         return self._residual(points.trial_stress + np.einsum("nij,nj->ni", points.tangent, spread))
 
     def begin_from(self, motion: Any) -> Any:
@@ -110,6 +128,8 @@ class EquilibriumStep:
     def correction(self) -> bool:
         """Solve the tangent system for the residual. Returns whether it was solved; `reason` says why not."""
         matrix = self._body.kinematics.stiffness()
+        if self._body.members:
+            matrix = self._body.members.with_stiffness(matrix, self._fixed[self._fixed < self._n_owned])
         self.reason = self._body.solver.solve(matrix, self._residual_vector, self._correction)
         return not self.reason
 
@@ -122,6 +142,7 @@ class EquilibriumStep:
         self.reason = next(filter(None, self._comm.allgather(failure)), "")
         if self.reason:
             return np.inf
+        self._follow_members()
         return self._residual(points.trial_stress + points.add_viscosity(self._laws, self._viscosity, strain))
 
     def out_of_balance(self) -> float:
@@ -135,7 +156,7 @@ class EquilibriumStep:
         """
         body, n = self._body, self._n_owned
         increment = body.increment.x.array[:n]
-        internal = body.kinematics.internal_forces(body.points.trial_stress).array[:n]
+        internal = body.internal_forces(body.points.trial_stress).array[:n]
         works = self._comm.allreduce(np.array([internal @ increment, self._external[:n] @ increment]))
         return works[0] / works[1] if works[1] > 0 else np.nan
 
@@ -158,9 +179,13 @@ class EquilibriumStep:
         """Make this the last point of the iteration."""
         self._base[:] = self._body.increment.x.array
 
+    def _follow_members(self, as_elastic: bool = False) -> None:
+        if self._body.members:
+            self._body.members.follow(self._body.increment.x.array[: self._n_owned], as_elastic)
+
     def _residual(self, stress: NDArray[np.float64]) -> float:
         """Norm of the out-of-balance forces over that of the forces at work."""
-        forces = self._body.kinematics.internal_forces(stress)
+        forces = self._body.internal_forces(stress)
         forces.array[:] = self._external - forces.array
         if self.scale is None:
             self.scale = self._forces_at_work(forces.array)
@@ -188,7 +213,7 @@ class EquilibriumStep:
         first and then yields carries a small part of them: of the reactions of a footing that is pressed into sand a
         hundredth.
         """
-        out_of_balance = self._external - self._body.kinematics.internal_forces(self._body.points.trial_stress).array
+        out_of_balance = self._external - self._body.internal_forces(self._body.points.trial_stress).array
         self.scale = min(self.scale, self._forces_at_work(out_of_balance))
 
     def _norm(self, array: NDArray[Any]) -> float:

@@ -141,11 +141,13 @@ def evaluate_at(
     return {name: search.values(function) for name, function in functions.items()}
 
 
-def local_cells(domain: Mesh, points: NDArray[np.float64], preferred: NDArray[np.float64]) -> NDArray[np.int32]:
+def local_cells(
+    domain: Mesh, points: NDArray[np.float64], preferred: NDArray[np.float64], tolerance: float = _TOLERANCE
+) -> NDArray[np.int32]:
     """Owned cell that contains each point, -1 if there is none on this rank: (n,).
 
     A point on the border of several cells goes to a preferred one, by a number for each cell, and among these to the one in
-    which it lies deepest.
+    which it lies deepest. It counts as inside up to a tolerance in barycentric coordinates.
     """
     dim, n_cells = domain.geometry.dim, owned_cells(domain)
     found = np.full(len(points), -1, dtype=np.int32)
@@ -155,11 +157,11 @@ def local_cells(domain: Mesh, points: NDArray[np.float64], preferred: NDArray[np
     padded = np.zeros((len(points), 3))
     padded[:, :dim] = points
     size = np.ptp(corners.reshape(-1, dim), axis=0).max()
-    offsets, cells = compat.candidate_cells(domain, np.arange(n_cells), padded, _TOLERANCE * size)
+    offsets, cells = compat.candidate_cells(domain, np.arange(n_cells), padded, tolerance * size)
     rows = np.repeat(np.arange(len(points)), np.diff(offsets))
     depth = _depth(corners[cells], points[rows])
     order = np.lexsort((depth, preferred[cells], rows))
-    order = order[depth[order] >= -_TOLERANCE]
+    order = order[depth[order] >= -tolerance]
     found[rows[order]] = cells[order]  # the deepest comes last and holds
     return found
 

@@ -141,7 +141,7 @@ class FemSite:
     def _enter(self, state: SiteState, stress: OfPosition | None = None) -> Load:
         """Change the body to a state; returns the state's load, which does not act yet. stress: of soils that are placed."""
         off = tuple(sorted(self._every.difference(state.there)))
-        self.fem.reconfigure(off, state.supports, state.pore_pressure, stress, self._laws(state))
+        self.fem.reconfigure(off, state.supports, state.pore_pressure, stress, self._laws(state), state.members)
         self.state = state
         moved = any(v for s in state.supports for v in (s.displacement or ()) if v)
         return Load({tag: state.unit_weight[tag] for tag in state.there}, state.pressure, float(moved))

@@ -11,6 +11,7 @@ from dolfinx import fem
 from dolfinx.mesh import Mesh
 from mpm_core.checks import within
 from mpm_core.collective import collectively
+from mpm_core.members import Member, MemberForces, of_members
 from mpm_core.parameter_fields import Field
 from numpy.typing import ArrayLike, NDArray
 
@@ -25,7 +26,7 @@ from fenics_bridge.fem.failure import explained, warn_of_motion
 from fenics_bridge.fem.fields import SupportedBody, nodal_average
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.kinematics import Kinematics
-from fenics_bridge.fem.linear_solver import LinearSolver
+from fenics_bridge.fem.linear_solver import AVERAGED_LIMIT, LinearSolver
 from fenics_bridge.fem.load_steps import LoadStep, raise_load
 from fenics_bridge.fem.loads import Load, LoadVectors, warn_of_weight
 from fenics_bridge.fem.locking import warn_of_laws
@@ -36,6 +37,7 @@ from fenics_bridge.fem.quadrature import QuadraturePoints
 from fenics_bridge.fem.solver import Solver, given_solver
 from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.mesh.names import known_tags
+from fenics_bridge.structures.installed import Members
 from fenics_bridge.types import Law, Laws, MeshTags, OfPosition
 from fenics_bridge.views import body_text, law_lines
 from mpm_core import Geometry
@@ -119,6 +121,8 @@ class QuasiStatic(SupportedBody, PointFunctions):
         """The boundary conditions in force"""
         self._loads = LoadVectors(space, facet_tags, cell_tags, radius=self.radius)
         self._water: fem.Function | None = None  # pore pressure, linear in each cell
+        self._members = Members(space)
+        self._n_own = space.dofmap.index_map.size_local * space.dofmap.index_map_bs
         self._materials = Materials(domain, law, cell_tags)
         quadrature = max(1, 2 * (degree - 1))
         axisymmetric = self.radius is not None
@@ -149,7 +153,8 @@ class QuasiStatic(SupportedBody, PointFunctions):
             if self._nmd
             else Kinematics(*parts, self.geometry)
         )
-        self._body = Body(self.displacement, self.increment, self.points, self._kinematics, constraints, linear)
+        operators = self._kinematics, constraints, linear, self._members
+        self._body = Body(self.displacement, self.increment, self.points, *operators)
 
     def reconfigure(
         self,
@@ -158,8 +163,11 @@ class QuasiStatic(SupportedBody, PointFunctions):
         pore_pressure: OfPosition | None = None,
         stress: OfPosition | None = None,
         law: Laws | None = None,
+        members: dict[str, Member] | None = None,
     ) -> None:
-        """Change soils, laws, supports or pore pressures; `solve` then releases the resulting out-of-balance forces. Collective.
+        """Change soils, laws, supports, members or pore pressures; `solve` then releases the resulting out-of-balance forces.
+
+        Collective.
 
         What is not given stays as it is. For stages, see `Stage`: cells of the soils in `off` carry no stress, stiffness or
         weight; cells that become active start without stress and state, or with the given stress. Afterwards `load.held` is 1,
@@ -172,11 +180,34 @@ class QuasiStatic(SupportedBody, PointFunctions):
                 for the present ones.
             stress: function of positions (n, D) [m] that returns the stresses (n, S) [Pa] of the cells that become active.
             law: law, or laws by cell tag, from now on; where the law changes, its state is reset.
+            members: the structural members that are there from now on by name, from `mpm_core.bar`, `strut` and `beam`; {} for
+                none, None for the present ones. A new one is installed without strain, as the soil is deformed now, and with its
+                prestress, which is constant until `solve` has reached its load.
 
         Raises:
-            InputError: an unknown tag, or values of another shape or not finite. Raised on all ranks alike.
+            InputError: an unknown tag, values of another shape or not finite, or a member outside of the soil. Raised on all ranks
+                alike.
         """
-        reconfigure(self, off, supports, pore_pressure, stress, law)
+        given = collectively(self.domain.comm, lambda: None if members is None else of_members(members))
+        reconfigure(self, off, supports, pore_pressure, stress, law, given)
+
+    @property
+    def members(self) -> dict[str, Member]:
+        """The structural members that are there, by name."""
+        return self._members.given
+
+    def member_forces(self, name: str) -> MemberForces:
+        """Axial forces, moments and displacements of a structural member. Collective.
+
+        Args:
+            name: name of the member.
+
+        Raises:
+            InputError: there is no such member. Raised on all ranks alike.
+        """
+        known = name in self._members.given
+        agree(self.domain.comm, None if known else f"name is {name!r}, expected one of {list(self._members)}")
+        return self._members.result(name, self.displacement.x.array[: self._n_own])
 
     @property
     def laws(self) -> list[Law]:
@@ -253,6 +284,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         """Reset displacements to zero; the stress stays."""
         self.displacement.x.array[:] = 0.0
         self._body.constraints.origin[:] = 0.0
+        self._members.reset_displacement()
         self.load = replace(self.load, displacement=0.0)
 
     def equilibrate(
@@ -325,11 +357,38 @@ class QuasiStatic(SupportedBody, PointFunctions):
         load = self._loads.resolved(load)
         warn_of_weight(self.domain.comm, load, self.cell_tags)
         steps = raise_load(self, load, first_step, tolerance, progress)
+        if self.converged:
+            self._members.lock_off()
         warn_of_motion(self)
         return steps
 
+    def _change_members(self, members: dict[str, Member]) -> None:
+        """Install, keep and remove members in the cells that are active now. Collective."""
+        comm, dim = self.domain.comm, self.domain.geometry.dim
+        if members:
+            other = next((name for name, member in members.items() if member.dim != dim), None)
+            agree(comm, f"members: {other!r} has {members[other].dim} dimensions, expected {dim}" if other else None)
+            wrong = (
+                "members in an axisymmetric body, expected plane strain or three dimensions" if self.radius else None
+            )
+            agree(comm, wrong)
+            factored = self._nmd and not self._body.solver.direct
+            agree(
+                comm,
+                f"members with nmd=True in more than {AVERAGED_LIMIT} nodes of three dimensions, expected degree=2, or the option "
+                "pc_type lu"
+                if factored
+                else None,
+            )
+        self._members.change(members, self._loads.active, self.displacement.x.array[: self._n_own])
+
+    def _internal_forces(self) -> NDArray[np.float64]:
+        """Nodal forces of the present stresses, and of the members. Collective."""
+        self._members.back()
+        return self._body.internal_forces(self.points.stress).array
+
     def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags, Sequence[Support]]:
-        out_of_balance = self._loads.forces(self.load) - self._kinematics.internal_forces(self.points.stress).array
+        out_of_balance = self._loads.forces(self.load) - self._internal_forces()
         return self.displacement.function_space, out_of_balance, self.facet_tags, self.supports
 
     def reaction(self, facet_tag: int | str) -> NDArray[np.float64]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 from mpm_core.checks import renamed
 from mpm_core.input_warnings import warn_of_water_weight
+from mpm_core.members import Member
 
 from fenics_bridge.errors import InputError, agree, is_finite
 from fenics_bridge.fem.k0 import Surface, surface_height
@@ -53,9 +54,14 @@ class Stage:
     """Function of positions (n, D) [m] that returns the stresses (n, S) [Pa] with which the soils of `fill` come, e.g. by K0"""
     reset_displacement: bool = False
     """Whether displacements count from the beginning of this stage"""
+    install: dict[str, Member] = field(default_factory=dict)
+    """Structural members (`mpm_core.bar`, `strut`, `beam`) by the name of each, without strain when they are installed. A prestress
+    is that at the end of this stage; from the next one on the force follows the deformation"""
+    remove: Any = ()
+    """Names of members, one or several, that are taken out"""
 
     def __post_init__(self) -> None:
-        for name in ("fill", "excavate", "release", "support"):
+        for name in ("fill", "excavate", "release", "support", "remove"):
             value = getattr(self, name)
             single = isinstance(value, (str, int)) or not hasattr(value, "__iter__")
             object.__setattr__(self, name, (value,) if single else tuple(value))
@@ -200,6 +206,8 @@ class SiteState:
         """The boundary conditions in force"""
         self.pore_pressure: OfPosition | None = None
         """Function of positions that returns pore pressures [Pa]"""
+        self.members: dict[str, Member] = {}
+        """Structural members that are there, by name"""
 
     def after(self, stage: Stage) -> tuple[SiteState, tuple[int, ...], tuple[int, ...]]:
         """The state that a stage leads to. Collective.
@@ -227,7 +235,7 @@ class SiteState:
         agree(self._comm, wrong)
         new.there = tuple(sorted(there.difference(excavate).union(fill)))
         agree(self._comm, None if new.there else f"{where}excavate: no soil is left")
-        agree(self._comm, _wrong_value(stage, where))
+        agree(self._comm, _wrong_value(stage, where) or _wrong_member(stage, where, self.members))
         new.law = self.law | self._by_soil(where + "law", stage.law)
         new.unit_weight = self.unit_weight | self._by_soil(where + "unit_weight", stage.unit_weight)
         without = [tag for tag in new.there if tag not in new.unit_weight]
@@ -235,6 +243,7 @@ class SiteState:
         pressure = {n: p for key, p in stage.pressure.items() for n in self._facets_of(key, where + "pressure")}
         new.pressure = {tag: p for tag, p in (self.pressure | pressure).items() if p != 0}
         new.supports = self._supports_after(stage, where)
+        new.members = {name: one for name, one in self.members.items() if name not in stage.remove} | stage.install
         if stage.pore_pressure is not None:
             new.pore_pressure = stage.pore_pressure
         return new, fill, excavate
@@ -261,6 +270,17 @@ class SiteState:
 
     def _by_soil(self, argument: str, given: Any) -> Any:
         return {number: value for key, value in given.items() for number in self._cells_of(key, argument)}
+
+
+def _wrong_member(stage: Stage, where: str, there: Mapping[str, Member]) -> str | None:
+    """Error in the members that a stage installs and removes; None without an error."""
+    if not isinstance(stage.install, dict) or not all(isinstance(one, Member) for one in stage.install.values()):
+        return f"{where}install is {stage.install!r}, expected a dictionary of what `bar`, `strut` and `beam` return, by name"
+    for name in stage.remove:
+        if name not in there:
+            return f"{where}remove: there is no member {name!r}, expected one of {list(there)}"
+    again = next((name for name in stage.install if name in there and name not in stage.remove), None)
+    return None if again is None else f"{where}install: the member {again!r} is there already"
 
 
 def _wrong_value(stage: Stage, where: str) -> str | None:

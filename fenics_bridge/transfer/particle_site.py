@@ -87,6 +87,7 @@ class ParticleSite:
         """
         model = self.model
         state, fill, excavate = self.state.after(stage)
+        self._refuse_members(stage)
         material = {
             **self._material,
             **{tag: self._number_of(state.law[tag], stage) for tag in stage_laws(stage, state)},
@@ -119,6 +120,10 @@ class ParticleSite:
         return StageReport(
             self.number, stage.name, report.cuts + 1, report.iterations, max(model.comm.allgather(float(moved)))
         )
+
+    def _refuse_members(self, stage: Stage) -> None:
+        problem = f"stage {stage.name!r}: install is {list(stage.install)}, expected none: quasi-static particles have no members"
+        agree(self.model.comm, problem if stage.install else None)
 
     def rows_of(self, soil: int | str) -> NDArray[np.bool_]:
         """Whether each particle of this rank is of a soil. Collective.

@@ -21,7 +21,7 @@ import fenics_bridge as bridge
 from particle_player import axis_labels, boundary_edges
 
 from .figures import curve_figure, save_figure
-from .plots import CURVES, ROUND_TICKS, WIDTH, Quantity, Scene, colour_limits, discs, paper_style
+from .plots import CURVES, MEMBER, ROUND_TICKS, WIDTH, Quantity, Scene, colour_limits, discs, paper_style
 from .soil_outlines import name_places, soil_outlines
 from .water_table import draw_water_table, top_with_water, water_legend
 
@@ -215,6 +215,7 @@ def save_mechanism(
     line_name: str = "",
     box: tuple[tuple[float, float], tuple[float, float]] | None = None,
     water: np.ndarray | None = None,
+    members: Sequence[np.ndarray] = (),
 ) -> None:
     """Draw a displacement increment: its length with arrows, and beside it its shear strain, with the names of the soils.
 
@@ -224,6 +225,7 @@ def save_mechanism(
         line_name: for the legend.
         box: (lower, upper) corner of what is shown; all by default.
         water: segments (k, 2, 2) [m] of the water table, in the soil and over standing water.
+        members: lines (n, 2) [m] of structural members.
     """
     water = np.empty((0, 2, 2)) if water is None else water
     lengths, shear = np.linalg.norm(field.values, axis=1), field.shear()
@@ -242,6 +244,7 @@ def save_mechanism(
                            **shown)  # fmt: skip
             for outline in (field.soils or {}).values():
                 axes.add_collection(LineCollection(outline, colors="#a0a0a0", linewidths=0.6, zorder=2))
+            axes.add_collection(LineCollection(members, colors=MEMBER, linewidths=1.6, zorder=4))
             seen = draw_water_table(axes, water)
             if line is not None:
                 axes.plot(*line.T, "--", color=LINE, linewidth=1.4, label=line_name)

@@ -32,6 +32,8 @@ SOIL = "#b98a5e"
 GREY = "#8c8c8c"
 BODY = "#1d3a5f"
 """Colour of rigid surfaces"""
+MEMBER = "#c8401c"
+"""Colour of structural members"""
 CURVES = ("#0b559f", "#c8401c", "#2a8a4a", "#7a4fa3", "#444444", "#d49a00")
 WIDTH = 6.9  # in; a page's text width
 DISPLACEMENT = Quantity("Total displacement", "m", colours="viridis")

@@ -42,13 +42,13 @@ import mpm_core as mpm
 
 from .checks import say
 from .site_doubts import warn_of_depth
-from .site_keys import changes_of, part_of, read_site_table, require_push
+from .site_keys import changes_of, member_of, part_of, read_site_table, require_push
 from .site_laws import is_number, law_at, law_keys, located, unit_doubt, unit_weight_of
 from .slope_case import GRAVITY
 
 AIR = ("air", "water", "empty")
 """Groups of a mesh that hold no soil by their names"""
-CHANGES = ("excavate", "law", "unit_weight", "pressure", "support", "release")
+CHANGES = ("excavate", "law", "unit_weight", "pressure", "support", "release", "install", "remove")
 """What a stage may change beside soils that it places"""
 DEFAULT_SUPPORTS = {"base": "fixed", **dict.fromkeys(("left", "right", "sides", "axis", "far"), "roller")}
 
@@ -59,7 +59,7 @@ class Site:
 
     domain, cell_tags, facet_tags: the whole mesh, with cells that never hold soil; soils: names, in the file's order
     laws: by cell tag; unit_weight: by soil [N/m3]; supports: of `fenics_bridge`; stages: as for `carry_out`
-    further_laws: those that come in by stages; axisymmetric: whether it is a half section; stage_rows: stages as in the file
+    further_laws: those that come in by stages; members: structural ones by name, of stages; axisymmetric: whether it is a half section; stage_rows: stages as in the file
     """
 
     domain: Any
@@ -73,6 +73,7 @@ class Site:
     further_laws: list[Any] = field(default_factory=list)
     axisymmetric: bool = False
     stage_rows: Sequence[dict[str, Any]] = ()
+    members: dict[str, mpm.Member] = field(default_factory=dict)
 
     @property
     def geometry(self) -> mpm.Geometry | None:
@@ -217,9 +218,10 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
         name: law_at(located(given, path), None, f"{path}: laws.{name}")
         for name, given in table.get("laws", {}).items()
     }
+    members = {name: member_of(given, f"{path}: members.{name}") for name, given in table.get("members", {}).items()}
     rows = table.get("stages", [])
     site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, supports_of(table, path, domain, facet_tags), [],
-                list(others.values()), axisymmetric, rows)  # fmt: skip
+                list(others.values()), axisymmetric, rows, members)  # fmt: skip
     site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(rows)]
     placed = {soil for stage in site.stages for soil in stage.fill}
     left = {soil: weight for soil, weight in weights.items() if soil not in placed}
@@ -316,6 +318,7 @@ def _stage(given: dict, number: int, site: Site, laws: dict[str, Any], path: Pat
     for soil in [*fill, *given.get("law", {})]:
         if soil not in site.unit_weight:
             raise mpm.InputError(f"{where}: soil {soil!r} is not among the soils {', '.join(site.unit_weight)}")
+    install, remove = (_member_names(given, key, site, where) for key in ("install", "remove"))
     for soil, law in given.get("law", {}).items():
         if law not in laws:
             raise mpm.InputError(
@@ -333,7 +336,22 @@ def _stage(given: dict, number: int, site: Site, laws: dict[str, Any], path: Pat
         release=given.get("release", ()),
         pore_pressure=_water(given["water_level"], where, site.domain) if "water_level" in given else None,
         reset_displacement=reset,
+        install={name: site.members[name] for name in install},
+        remove=remove,
     )  # fmt: skip
+
+
+def _member_names(given: dict, key: str, site: Site, where: str) -> list[str]:
+    """Names of structural members that a stage installs or removes."""
+    names = given.get(key, [])
+    names = [names] if isinstance(names, str) else names
+    if not isinstance(names, list):
+        raise mpm.InputError(f"{where}: {key} is {names!r}, expected names of members")
+    for name in names:
+        if name not in site.members:
+            known = ", ".join(site.members) or "there is none"
+            raise mpm.InputError(f"{where}: {name!r} is not among the tables [members.NAME]: {known}")
+    return names
 
 
 def _water(level: Any, where: str, domain: Any) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ KEYS = {
     "boundaries": "tables [boundaries.NAME] of what the water does there",
     "pressures": "loads by boundary [Pa]",
     "points": "places [x, y] whose settlements are followed",
+    "members": "tables [members.NAME] of bars, struts and beams that stages install",
     "stages": "tables [[stages]] of what is placed and dug away",
 }
 """What stands at the top of a site's file, and what it is"""
@@ -47,9 +49,11 @@ CONDITIONS: dict[str, tuple[Callable, float]] = {
 """Boundary condition by its key, and what one of its units is in SI"""
 WATER = (*CONDITIONS, "seepage_face")
 """Keys of a boundary"""
+MEMBERS: dict[str, Callable] = {"bar": mpm.bar, "strut": mpm.strut, "beam": mpm.beam}
+"""Function that makes a structural member of each kind"""
 STAGE_KEYS = (
     "name", "day", "duration", "fill", "excavate", "boundaries", "law", "unit_weight", "pressure", "support", "release",
-    "water_level", "reset_displacement",
+    "water_level", "reset_displacement", "install", "remove",
 )  # fmt: skip
 
 
@@ -80,6 +84,8 @@ def read_site_table(path: Path, needed: Sequence[str] = ()) -> dict[str, Any]:
     for key, known in (("soils", (*FLOW, "unit_weight", *law_keys())), ("laws", law_keys()), ("boundaries", WATER)):
         for name, given in _table_at(table, key, str(path)).items():
             _require_known(given, known, f"{path}: {key}.{name}")
+    for name, given in _table_at(table, "members", str(path)).items():
+        _require_member(given, f"{path}: members.{name}")
     stages = table.get("stages", [])
     if isinstance(stages, dict):  # a single one
         stages = table["stages"] = [stages]
@@ -108,6 +114,37 @@ def _require_known(given: Any, known: Collection[str], where: str) -> None:
     for key in given:
         if key not in known:
             raise mpm.InputError(f"{where}: {unknown_key(key, known)}")
+
+
+def _require_member(given: Any, where: str) -> None:
+    """Require that the keys of a structural member are those of its kind."""
+    kind = given.get("kind") if isinstance(given, dict) else None
+    if kind not in MEMBERS:
+        raise mpm.InputError(f"{where}: kind is {kind!r}, expected one of {', '.join(map(repr, MEMBERS))}")
+    arguments = [name for name in signature(MEMBERS[kind]).parameters if name not in ("start", "end")]
+    _require_known(given, ("kind", "points", *arguments), where)
+
+
+def member_of(given: Mapping[str, Any], where: str) -> mpm.Member:
+    """The structural member that the table of a site describes; where: it stands, for messages.
+
+    Raises:
+        InputError: a value is missing or out of range.
+    """
+    arguments = {key: value for key, value in given.items() if key != "kind"}
+    if "points" not in arguments:
+        raise mpm.InputError(f"{where} has no points, expected those of its line, such as [[0, 0], [0, -5]]")
+    try:
+        if given["kind"] != "strut":
+            return MEMBERS[given["kind"]](**arguments)
+        ends = arguments.pop("points")
+        if not isinstance(ends, list) or len(ends) != 2:
+            raise mpm.InputError(f"points is {ends!r}, expected the two ends of a strut")
+        return mpm.strut(*ends, **arguments)
+    except mpm.InputError as error:
+        raise mpm.InputError(f"{where}: {error}") from None
+    except TypeError as error:  # an argument without a default is not there
+        raise mpm.InputError(f"{where}: {str(error).partition(') ')[2] or error}") from None
 
 
 def require_push(pressure: float, where: str) -> None:

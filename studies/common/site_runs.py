@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
 
+import numpy as np
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -111,9 +112,10 @@ def _drawn(
     curves = {name: (1e3 * run.curve[:, 1], run.curve[:, 0]) for name, run in zip(names, runs)}
     wide, lowest = 1e3 * bend([run.curve for run in runs]), 0.98 * min(run.curve[0, 0] for run in runs)
     values, least = {"site": [run.value for run in runs]}, "" if runs[-1].failed else "of at least "
+    lines = [np.array(member.points) for member in model.members.values()]
     title = f"{label.split(' [')[0]} {least}{runs[-1].value:.3f}"
     pictures: Pictures = {
-        "mechanism": lambda: save_mechanism(folder / "mechanism.png", field, title, water=table),
+        "mechanism": lambda: save_mechanism(folder / "mechanism.png", field, title, water=table, members=lines),
         "value_displacement": lambda: save_curves(
             folder / "value_displacement.png", curves, ("Largest displacement [mm]", label), limits=((0, wide), (lowest, None))),
     }  # fmt: skip

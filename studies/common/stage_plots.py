@@ -19,7 +19,7 @@ from particle_player import axis_labels, boundary_edges
 
 from .field_plots import Field, gathered
 from .figures import Pictures, curve_figure, label_axes, panel_figure, save_figure
-from .plots import CURVES, Quantity, paper_style
+from .plots import CURVES, MEMBER, Quantity, paper_style
 from .water_table import draw_water_table, level_line, top_with_water, water_legend
 
 MOVED = Quantity("Displacement", "mm", scale=1e3, colours="viridis")
@@ -31,7 +31,7 @@ class StagePicture:
     """A stage for pictures, on the first rank.
 
     displacement: at the corners of all cells [m]; there: of each cell; strain: accumulated deviatoric strain of each cell [-]
-    water: segments (k, 2, 2) [m] of the water table, none where the site is dry
+    water: segments (k, 2, 2) [m] of the water table, none where the site is dry; members: lines (n, 2) [m] of structural ones
     """
 
     name: str
@@ -39,6 +39,7 @@ class StagePicture:
     there: np.ndarray
     strain: np.ndarray
     water: np.ndarray = field(default_factory=lambda: np.empty((0, 2, 2)))
+    members: Sequence[np.ndarray] = ()
 
     def field(self) -> Field:
         """The displacement on the cells that are there."""
@@ -60,7 +61,8 @@ def stage_picture(site: bridge.FemSite, name: str) -> StagePicture | None:
     material, strain = (np.concatenate(arrays) for arrays in zip(*parts))
     box = moved.points.min(axis=0), moved.points.max(axis=0)
     water = {"water": level_line(pressure, *box)} if pressure else {}
-    return StagePicture(name, moved, material >= 0, strain, **water)
+    lines = [np.array(member.points) for member in fem.members.values()]
+    return StagePicture(name, moved, material >= 0, strain, members=lines, **water)
 
 
 def own_cell_values(fem: bridge.QuasiStatic) -> list[np.ndarray]:
@@ -89,6 +91,7 @@ def save_stages(path: Path, stages: Sequence[StagePicture], quantity: Quantity) 
                            rasterized=True, **per_cell)  # fmt: skip
             outline = field.points[boundary_edges(field.cells)]
             axes.add_collection(LineCollection(outline, colors="black", linewidths=0.7))
+            axes.add_collection(LineCollection(stage.members, colors=MEMBER, linewidths=1.6, capstyle="butt"))
             axes.set_title(f"Stage: {stage.name}", loc="left", pad=3)
             axes.set(aspect="equal", xlim=box[:, 0], ylim=box[:, 1])
             table = draw_water_table(axes, stage.water) or table

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +15,12 @@ from mpi4py import MPI
 import fenics_bridge as bridge
 from fenics_bridge.fem.stages import require_stages
 
+from .figures import Pictures
+from .member_results import StageForces, force_row, member_pictures, stage_forces, write_members
 from .quiet import NOT_REACHED, without_warning
 from .site_file import Site
 from .site_options import add_site_file
-from .stage_plots import StageFiles, stage_picture
+from .stage_plots import StageFiles, StagePicture, stage_picture, stage_pictures
 
 
 def add_stage_options(parser: ArgumentParser, site: str, elements: str) -> None:
@@ -25,11 +29,28 @@ def add_stage_options(parser: ArgumentParser, site: str, elements: str) -> None:
     add_site_file(parser, site, "soils, supports and stages", (elements, ("P1", "P2", "P4"), meaning))
 
 
+@dataclass
+class StageRun:
+    """Stages that were carried out.
+
+    site: in its last equilibrium; rows: of results, one for each stage; pictures: the same, on the first rank; forces: of the
+    structural members; stopped: why the stages ended early, None if they did not
+    """
+
+    site: bridge.FemSite
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    pictures: list[StagePicture] = field(default_factory=list)
+    forces: list[StageForces] = field(default_factory=list)
+    stopped: str | None = None
+
+    def drawn(self, stages: Sequence[bridge.Stage], folder: Path) -> Pictures:
+        """Pictures of the stages and of the structural members."""
+        return {**stage_pictures(stages, self.rows, self.pictures, folder), **member_pictures(self.forces, folder)}
+
+
 @without_warning(NOT_REACHED)  # said by the error
-def carry_out(
-    site: Site, degree: int, folder: Path, comm: MPI.Comm, **options: Any
-) -> tuple[bridge.FemSite, list[dict], list, str | None]:
-    """Carry out all stages; returns the site, a row and a picture for each stage, and the reason of an early end. Collective.
+def carry_out(site: Site, degree: int, folder: Path, comm: MPI.Comm, **options: Any) -> StageRun:
+    """Carry out all stages, with files for ParaView and tables in the folder. Collective.
 
     Args:
         options: of `Site.finite_elements`.
@@ -37,23 +58,26 @@ def carry_out(
     Raises:
         InputError: before the first stage, for one that cannot follow those before it.
     """
-    staged, rows, pictures, stopped = bridge.FemSite(site.finite_elements(degree, **options)), [], [], None
-    require_stages(staged, site.stages)
-    with StageFiles(staged, folder / "stages", comm) as files:
+    run = StageRun(bridge.FemSite(site.finite_elements(degree, **options)))
+    require_stages(run.site, site.stages)
+    with StageFiles(run.site, folder / "stages", comm) as files:
         for stage in site.stages:
             try:
-                report = staged.carry_out(stage)
+                report = run.site.carry_out(stage)
             except bridge.StageError as error:
-                stopped = str(error)
+                run.stopped = str(error)
                 break
             files.write(report.number)
-            rows.append({**movements(staged), "stage": report.name, "steps": report.steps, "iterations": report.iterations,
-                         "largest_displacement_m": report.largest_displacement})  # fmt: skip
-            pictures.append(stage_picture(staged, report.name))
-            if comm.rank == 0:
+            run.forces.append(stage_forces(run.site, report.name))
+            run.rows.append({**movements(run.site), "stage": report.name, "steps": report.steps, "iterations": report.iterations,
+                             "largest_displacement_m": report.largest_displacement, **force_row(run.forces[-1])})  # fmt: skip
+            picture = stage_picture(run.site, report.name)
+            if picture is not None:
+                run.pictures.append(picture)
                 print(f"stage {report.number}, {report.name}: {report.steps} steps, largest displacement "
                       f"{1e3 * report.largest_displacement:.1f} mm", file=sys.stderr)  # fmt: skip
-    return staged, rows, [picture for picture in pictures if picture is not None], stopped
+    write_members(folder, run.forces, comm)
+    return run
 
 
 def movements(staged: bridge.FemSite) -> dict[str, float]:

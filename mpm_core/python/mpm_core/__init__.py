@@ -41,6 +41,7 @@ from .ghost import GhostPenalty
 from .integration import default_integration
 from .law_parameters import signature_of
 from .laws import log_preconsolidation, matched_drucker_prager, nor_sand_state, sanisand_state, tresca, von_mises
+from .members import Member, MemberForces, bar, beam, strut
 from .mesh import Mesh
 from .model import Model
 from .motion import Motion, motion_of_acceleration, read_acceleration, read_accelerogram
@@ -84,6 +85,8 @@ __all__ = [
     "Integration",
     "LawParameter",
     "LinearElastic",
+    "Member",
+    "MemberForces",
     "Mesh",
     "Model",
     "MohrCoulomb",
@@ -116,6 +119,8 @@ __all__ = [
     "ViscoplasticMohrCoulomb",
     "Wedge",
     "__version__",
+    "bar",
+    "beam",
     "checkpoint_description",
     "critical_cell",
     "default_integration",
@@ -129,6 +134,7 @@ __all__ = [
     "read_accelerogram",
     "sanisand_state",
     "space",
+    "strut",
     "tresca",
     "von_mises",
 ]

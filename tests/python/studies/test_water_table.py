@@ -193,7 +193,7 @@ def test_a_site_shows_the_water_of_its_last_stage(study, level, tmp_path, monkey
     """The flood of the dike stands at 7 m; collapse leaves out what stages change, and with it their water."""
     waters = []
     runs = importlib.import_module("common.site_runs")
-    monkeypatch.setattr(runs, "save_mechanism", lambda path, field, title, water=None: waters.append(water))
+    monkeypatch.setattr(runs, "save_mechanism", lambda path, field, title, water=None, members=(): waters.append(water))
     options = f"--site {ROOT}/meshes/dike.toml --meshes 1 --cell-size 3 --output {tmp_path / 'results'}"
     assert importlib.import_module(study).main(options.split()) == 0
     assert np.allclose(waters[0][..., 1], level) if level else waters == [None]
@@ -203,10 +203,8 @@ def test_a_site_shows_the_water_of_its_last_stage(study, level, tmp_path, monkey
 
 def test_stages_show_the_water_of_each(tmp_path, monkeypatch):
     drawn = []
-    excavation = importlib.import_module("excavation")
-    monkeypatch.setattr(
-        excavation, "stage_pictures", lambda stages, rows, pictures, folder: drawn.extend(pictures) or {}
-    )
+    excavation, runs = importlib.import_module("excavation"), importlib.import_module("common.stage_runs")
+    monkeypatch.setattr(runs, "stage_pictures", lambda stages, rows, pictures, folder: drawn.extend(pictures) or {})
     options = f"--site {ROOT}/meshes/dike.toml --cell-size 3 --elements P1 --no-compare --output {tmp_path / 'results'}"
     assert excavation.main(options.split()) == 0
     levels = [(picture.water[..., 1].min(), picture.water[..., 1].max()) for picture in drawn]

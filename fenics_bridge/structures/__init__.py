@@ -1,0 +1,1 @@
+"""Structural members in bodies of finite elements."""

@@ -1,0 +1,100 @@
+"""Points that are embedded in finite elements: each moves with the cell that contains it, by its shape functions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import basix
+import numpy as np
+from numpy.typing import NDArray
+
+from fenics_bridge import compat
+from fenics_bridge.errors import agree
+from fenics_bridge.fem.evaluate import local_cells
+from fenics_bridge.mesh.background import global_numbers
+from fenics_bridge.mesh.tagged import owned_cells
+
+TOLERANCE = 0.02
+"""How far outside of the soil a point may be, in barycentric coordinates of the nearest cell: the corners of a line that the mesh
+follows are known by rounded coordinates only"""
+
+SAMPLES = 100
+"""Points along a line at which the size of the cells around it is looked up"""
+
+
+class Embedding:
+    """The cells around some points, and the shape functions of their nodes there; the same on all ranks. Collective.
+
+    Args:
+        space: Lagrange space of displacements.
+        points: positions (n, D) [m], the same on all ranks.
+        active: function that is 1 in cells that are there and 0 in others; None where all are.
+        what: what the points belong to, for the message.
+
+    Raises:
+        InputError: a point is in no active cell. Raised on all ranks alike.
+    """
+
+    def __init__(self, space: Any, points: NDArray[np.float64], active: Any, what: str) -> None:
+        domain = space.mesh
+        cells = _active_cells(domain, points, active)
+        mine = _mine(domain.comm, cells >= 0)
+        weights = shape_functions(space, cells[mine], points[mine])
+        index_map = space.dofmap.index_map
+        numbers = global_numbers(index_map, index_map.size_local + index_map.num_ghosts)
+        nodes = numbers[compat.cell_dofs(space)[cells[mine]]]
+        found = domain.comm.allgather((mine, nodes, weights))
+        order = np.concatenate([rows for rows, _, _ in found])
+        lost = np.setdiff1d(np.arange(len(points)), order)
+        if len(lost):
+            where = ", ".join(f"{x:.6g}" for x in points[lost[0]])
+            agree(
+                domain.comm, f"{what}: the point ({where}) m is in no soil that is there, expected points in the soil"
+            )
+        back = np.argsort(order)
+        self.nodes = np.concatenate([each for _, each, _ in found])[back]
+        """Global numbers of the nodes of each point's cell, (n, k)"""
+        self.weights = np.concatenate([each for _, _, each in found])[back]
+        """Their shape functions at the point, (n, k)"""
+
+
+def cell_size_along(domain: Any, line: NDArray[np.float64]) -> float:
+    """Median length of the edges of the cells along a line (k, D) [m]; 0 where the line is outside of the mesh. Collective."""
+    ends = np.linspace(0, len(line) - 1, SAMPLES)
+    part = np.minimum(ends.astype(int), len(line) - 2)
+    samples = line[part] + (ends - part)[:, None] * (line[part + 1] - line[part])
+    cells = _active_cells(domain, samples, None)
+    corners = domain.geometry.x[compat.cell_nodes(domain)[cells[cells >= 0]], : domain.geometry.dim]
+    first, second = np.triu_indices(domain.geometry.dim + 1, 1)
+    edges = np.linalg.norm(corners[:, first] - corners[:, second], axis=2)
+    every = np.concatenate(domain.comm.allgather(edges.ravel()))
+    return float(np.median(every)) if len(every) else 0.0
+
+
+def shape_functions(space: Any, cells: NDArray[np.int32], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Shape functions (n, k) of a Lagrange space at points (n, D) in this rank's cells (n,)."""
+    domain = space.mesh
+    dim = domain.geometry.dim
+    corners = domain.geometry.x[compat.cell_nodes(domain)[cells], :dim]
+    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    reference = np.linalg.solve(edges, (points - corners[:, 0])[:, :, None])[:, :, 0]
+    kind = basix.CellType.triangle if dim == 2 else basix.CellType.tetrahedron
+    element = basix.create_element(
+        basix.ElementFamily.P, kind, compat.degree_of(space), basix.LagrangeVariant.gll_warped
+    )
+    return element.tabulate(0, reference)[0].reshape(len(cells), element.dim)
+
+
+def _active_cells(domain: Any, points: NDArray[np.float64], active: Any) -> NDArray[np.int32]:
+    """This rank's active cell at each point; -1 where it has none."""
+    there = np.ones(owned_cells(domain))
+    if active is not None:
+        there = active.x.array[compat.cell_dofs(active.function_space)[: len(there), 0]]
+    cells = local_cells(domain, points, there, TOLERANCE)
+    return np.where(there[cells] > 0, cells, -1).astype(np.int32) if len(there) else cells
+
+
+def _mine(comm: Any, found: NDArray[np.bool_]) -> NDArray[np.integer]:
+    """Points that this rank is the first to have found."""
+    first = np.argmax(comm.allgather(found), axis=0)
+    return np.flatnonzero(found & (first == comm.rank))

@@ -1,0 +1,245 @@
+"""Structural members in a body of finite elements: their axial forces and moments, and what these do to the nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from mpm_core.members import Member, MemberForces, member_strains
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy import sparse
+
+from fenics_bridge import compat
+from fenics_bridge.structures.embedding import Embedding, cell_size_along
+
+
+@dataclass
+class _Installed:
+    """A member that is there, with what it has carried so far."""
+
+    member: Member
+    nodes: NDArray[np.float64]
+    segments: int
+    lengths: NDArray[np.float64]
+    """Length over which each strain acts [m], (k,)"""
+    force: NDArray[np.float64]
+    """Axial force of each segment [N], then moment at each inner node [N m], (k,)"""
+    origin: NDArray[np.float64]
+    """Displacement of the nodes at the installation [m], (n, D)"""
+    stressing: bool
+    """Whether it is being stressed: its axial forces stay what they are"""
+    embedding: Any = None
+    movement: Any = None
+    """Matrix of the displacements of the nodes by those of the body's nodes (n D, dofs)"""
+    strain: Any = None
+    """Matrix of the strains by the displacements of the body's nodes (k, dofs)"""
+
+    def stiffness(self) -> NDArray[np.float64]:
+        """Elastic stiffness of each strain: (k,)."""
+        axial = 0.0 if self.stressing else self.member.axial_stiffness
+        return np.where(self._is_axial(), axial, self.member.bending_stiffness)
+
+    def limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Least and largest force of each strain: (k,) each."""
+        axial, member = self._is_axial(), self.member
+        least = np.where(axial, -member.compressive_strength, -member.plastic_moment)
+        return least, np.where(axial, member.tensile_strength, member.plastic_moment)
+
+    def _is_axial(self) -> NDArray[np.bool_]:
+        return np.arange(len(self.lengths)) < self.segments
+
+
+class Members:
+    """The structural members of a body, elastic and perfectly plastic, small rotations. Collective.
+
+    Displacements of the members' nodes are those of the soil there, so that a strain is linear in the displacements u of the body's
+    nodes, e = G u, and the forces on these are G^T (L s), with the axial forces and moments s over their lengths L. The rows of G
+    are the same on all ranks, which each multiply their own columns.
+
+    Args:
+        space: Lagrange space of displacements.
+    """
+
+    def __init__(self, space: Any) -> None:
+        self._space, self._comm = space, space.mesh.comm
+        index_map, block = space.dofmap.index_map, space.dofmap.index_map_bs
+        self._n_own, self._n = index_map.size_local * block, index_map.size_global * block
+        self._first = index_map.local_range[0] * block
+        self._there: dict[str, _Installed] = {}
+        self._trial: NDArray[np.float64] = np.zeros(0)
+        self._tangent: NDArray[np.float64] = np.zeros(0)
+        self._strains: Any = None
+
+    def __bool__(self) -> bool:
+        return bool(self._there)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._there)
+
+    @property
+    def given(self) -> dict[str, Member]:
+        """The members by name."""
+        return {name: one.member for name, one in self._there.items()}
+
+    def change(self, members: dict[str, Member], active: Any, displacement: NDArray[np.float64]) -> None:
+        """Keep the members of these names, remove others, and install those that are new. Collective.
+
+        Args:
+            members: the members that are there from now on.
+            active: function that is 1 in the cells that are there and 0 in others; None where all are.
+            displacement: displacements of this rank's own dofs now [m].
+
+        Raises:
+            InputError: a node of a member is in no soil that is there. Raised on all ranks alike.
+        """
+        self.lock_off()
+        there: dict[str, _Installed] = {}
+        for name, member in members.items():
+            kept = self._there.get(name)
+            there[name] = kept if kept is not None and kept.member == member else self._installed(member)
+            self._embed(name, there[name], active)
+            if there[name] is not kept:
+                there[name].origin = self._moved(there[name], displacement)
+        self._there = there
+        self._strains = sparse.vstack([one.strain for one in there.values()]).tocsr() if there else None
+        self.back()
+
+    def lock_off(self) -> None:
+        """Let the forces of members that were being stressed follow their strains from now on."""
+        for one in self._there.values():
+            one.stressing = False
+
+    def follow(self, increment: NDArray[np.float64], as_elastic: bool = False) -> None:
+        """Forces and stiffness after an increment, for `forces` and `with_stiffness`. Collective.
+
+        Args:
+            increment: displacements of this rank's own dofs since the last step that was accepted [m].
+            as_elastic: as the elastic stiffness predicts them, also where they exceed the strength: for the first residual of a step.
+        """
+        strain = self._strain(increment)
+        stiffness, least, largest, now = self._properties()
+        elastic = now + stiffness * strain
+        self._trial = elastic if as_elastic else np.clip(elastic, least, largest)
+        is_elastic = as_elastic | ((elastic >= least) & (elastic <= largest))
+        self._tangent = np.where(is_elastic, stiffness, 0.0)
+
+    def accept(self) -> None:
+        """Accept the forces of the last `follow` as those that the next step starts from."""
+        for one, force in self._by_member(self._trial):
+            one.force = force.copy()
+
+    def snapshot(self) -> list[NDArray[np.float64]]:
+        """Copies of the forces, for `restore`."""
+        return [one.force.copy() for one in self._there.values()]
+
+    def restore(self, snapshot: list[NDArray[np.float64]]) -> None:
+        """Restore forces that were copied before."""
+        for one, force in zip(self._there.values(), snapshot, strict=True):
+            one.force = force.copy()
+        self.back()
+
+    def forces(self) -> Any:
+        """Internal nodal forces on this rank's own dofs [N]."""
+        return self._own(self._strains).T @ (self._lengths() * self._trial)
+
+    def with_stiffness(self, matrix: PETSc.Mat, held: NDArray[np.integer]) -> PETSc.Mat:
+        """A matrix of the soil with the members' stiffness, without rows and columns of the supports. Collective.
+
+        Args:
+            matrix: stiffness of the soil; it stays as it is.
+            held: this rank's own dofs that supports prescribe.
+        """
+        free = np.ones(self._n_own)
+        free[held] = 0.0
+        free = np.concatenate(self._comm.allgather(free))
+        of_all = self._strains @ sparse.diags(free)
+        own = (self._own(of_all).T @ sparse.diags(self._lengths() * self._tangent) @ of_all).tocsr()
+        own.sort_indices()
+        size = (self._n_own, self._n)
+        parts = own.indptr.astype(np.int32), own.indices.astype(np.int32), own.data
+        ours = PETSc.Mat().createAIJ((size, size), csr=parts, comm=self._comm)
+        both = matrix.copy()
+        both.axpy(1.0, ours, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        return both
+
+    def result(self, name: str, displacement: NDArray[np.float64]) -> MemberForces:
+        """Forces of a member in the last step accepted. Collective.
+
+        Args:
+            name: name of the member.
+            displacement: displacements of this rank's own dofs [m].
+        """
+        one = self._there[name]
+        moment = np.zeros(len(one.nodes))
+        if len(one.force) > one.segments:
+            moment[1:-1] = one.force[one.segments :]
+        moved = self._moved(one, displacement) - one.origin
+        return MemberForces(one.nodes, moved, one.force[: one.segments].copy(), moment)
+
+    def _installed(self, member: Member) -> _Installed:
+        """A member without any strain."""
+        degree = min(2, compat.degree_of(self._space))
+        spacing = cell_size_along(self._space.mesh, np.array(member.points)) / degree or member.length
+        nodes = member.nodes(spacing)
+        strains = member_strains(nodes, member.bending_stiffness > 0)
+        force = np.zeros(len(strains.lengths))
+        force[: strains.segments] = member.prestress
+        return _Installed(
+            member, nodes, strains.segments, strains.lengths, force, np.zeros_like(nodes), member.prestress != 0
+        )
+
+    def _embed(self, name: str, one: _Installed, active: Any) -> None:
+        """Find the cells around the nodes of a member."""
+        count, dim = one.nodes.shape
+        moving = one.nodes[:-1] if one.member.fixed_end else one.nodes
+        embedding = Embedding(self._space, moving, active, f"the member {name!r}")
+        components = np.arange(dim)
+        columns = (dim * embedding.nodes[:, None, :] + components[:, None]).ravel()
+        rows = np.broadcast_to(
+            (dim * np.arange(len(moving))[:, None] + components)[:, :, None],
+            (len(moving), dim, embedding.nodes.shape[1]),
+        )
+        values = np.broadcast_to(embedding.weights[:, None, :], rows.shape)
+        one.movement = sparse.csr_matrix((values.ravel(), (rows.ravel(), columns)), (count * dim, self._n))
+        operator = member_strains(one.nodes, one.member.bending_stiffness > 0).operator
+        one.strain = sparse.csr_matrix(operator.reshape(len(operator), -1)) @ one.movement
+
+    def _own(self, matrix: Any) -> Any:
+        """The columns of this rank's own dofs."""
+        return matrix[:, self._first : self._first + self._n_own]
+
+    def _strain(self, displacement: NDArray[np.float64]) -> Any:
+        return self._comm.allreduce(self._own(self._strains) @ displacement)
+
+    def _moved(self, one: _Installed, displacement: NDArray[np.float64]) -> Any:
+        """Displacements of the nodes of a member (n, D) [m]. Collective."""
+        return self._comm.allreduce(self._own(one.movement) @ displacement).reshape(one.nodes.shape)
+
+    def _lengths(self) -> NDArray[np.float64]:
+        return np.concatenate([one.lengths for one in self._there.values()])
+
+    def _properties(self) -> Any:
+        """Stiffness, least and largest force, and force of all strains."""
+        there = self._there.values()
+        least, largest = zip(*(one.limits() for one in there))
+        parts = [one.stiffness() for one in there], least, largest, [one.force for one in there]
+        return tuple(map(np.concatenate, parts))
+
+    def reset_displacement(self) -> None:
+        """Count displacements from now on, those of the body being zero."""
+        for one in self._there.values():
+            one.origin = np.zeros_like(one.nodes)
+
+    def back(self) -> None:
+        """Go back to the forces of the last step accepted, with elastic stiffness."""
+        if self:
+            self._tangent, _, _, self._trial = self._properties()
+
+    def _by_member(self, values: NDArray[np.float64]) -> Iterator[tuple[_Installed, NDArray[np.float64]]]:
+        start = 0
+        for one in self._there.values():
+            yield one, values[start : start + len(one.lengths)]
+            start += len(one.lengths)

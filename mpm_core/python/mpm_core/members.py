@@ -1,0 +1,269 @@
+"""Structural members: bars, struts and beams that are embedded in soil, in plane strain and, without bending, in three dimensions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from ._core import InputError
+from .checks import flag, positive, real_numbers, within
+
+NO_COMPRESSION = 0.0
+"""Compressive strength of what buckles at once, such as a geogrid [N/m]"""
+
+
+@dataclass(frozen=True)
+class Member:
+    """A structural member along a line; see `bar`, `strut` and `beam`, which make one.
+
+    Stiffness, strength and forces are per metre out of the plane in plane strain (those of one nail or anchor over their distance
+    in this direction), and those of the member itself in three dimensions.
+    """
+
+    points: tuple[tuple[float, ...], ...]
+    """Corners of its line [m], in order"""
+    axial_stiffness: float
+    """E A [N/m], [N] in three dimensions"""
+    bending_stiffness: float = 0.0
+    """E I [N m2/m]; 0 without bending"""
+    tensile_strength: float = math.inf
+    """Largest axial force [N/m], at which the member yields"""
+    compressive_strength: float = math.inf
+    """Largest axial force in compression [N/m], a positive number"""
+    plastic_moment: float = math.inf
+    """Largest bending moment [N m/m]"""
+    prestress: float = 0.0
+    """Axial force with which the member is installed [N/m], tension positive"""
+    bonded: bool = True
+    """Whether the member moves with the soil along its whole length, or only its two ends do"""
+    fixed_end: bool = False
+    """Whether its last point is held in space"""
+    spacing: float | None = field(default=None)
+    """Length of the segments into which it is divided [m]; None for a length that suits the cells"""
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space, 2 or 3."""
+        return len(self.points[0])
+
+    @property
+    def length(self) -> float:
+        """Length of the line [m]."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+    def nodes(self, spacing: float) -> NDArray[np.float64]:
+        """Positions (n, D) [m] that divide the line into equal segments between its corners.
+
+        Args:
+            spacing: length of the segments [m], where the member has none of its own; a member that is not bonded has one segment.
+        """
+        corners = np.array(self.points)
+        if not self.bonded:
+            return corners[[0, -1]]
+        parts = [corners[:1]]
+        for start, end in zip(corners, corners[1:]):
+            count = max(1, math.ceil(float(np.linalg.norm(end - start)) / (self.spacing or spacing) - 1e-6))
+            parts.append(start + np.linspace(0, 1, count + 1)[1:, None] * (end - start))
+        return np.concatenate(parts)
+
+
+def bar(
+    points: ArrayLike,
+    axial_stiffness: float,
+    tensile_strength: float = math.inf,
+    compressive_strength: float = math.inf,
+    prestress: float = 0.0,
+    spacing: float | None = None,
+) -> Member:
+    """A bar that moves with the soil along its whole length: a soil nail, a geogrid, the grouted body of an anchor.
+
+    Between bar and soil nothing slips: a bar is pulled out when the soil around it yields.
+
+    Args:
+        points: two or more points of its line [m], shape (k, D).
+        axial_stiffness: E A [N/m], [N] in three dimensions.
+        tensile_strength: largest axial force [N/m], at which it yields; by default it stays elastic.
+        compressive_strength: largest axial force in compression [N/m], a positive number; 0 for geogrids, which carry none.
+        prestress: axial force with which it is installed [N/m], tension positive.
+        spacing: length of the segments into which it is divided [m]; by default about the distance of the nodes around it.
+
+    Raises:
+        InputError: a value is out of range.
+
+    Example:
+        >>> nail = mpm.bar([(4.0, 6.0), (-2.0, 5.0)], axial_stiffness=70e6, tensile_strength=120e3)
+    """
+    return _checked(
+        Member(points, axial_stiffness, 0.0, tensile_strength, compressive_strength, math.inf, prestress, True, False, spacing)  # type: ignore[arg-type]
+    )
+
+
+def strut(
+    start: ArrayLike,
+    end: ArrayLike,
+    axial_stiffness: float,
+    tensile_strength: float = math.inf,
+    compressive_strength: float = math.inf,
+    prestress: float = 0.0,
+    fixed_end: bool = False,
+) -> Member:
+    """A straight member whose two ends alone are connected with the soil or with a wall: a strut, a tie, the free length of an anchor.
+
+    Args:
+        start: one end [m], shape (D,).
+        end: the other end [m], shape (D,).
+        axial_stiffness: E A [N/m], [N] in three dimensions.
+        tensile_strength: largest axial force [N/m], at which it yields; 0 for a strut that is only pressed against the wall.
+        compressive_strength: largest axial force in compression [N/m], a positive number; 0 for a cable.
+        prestress: axial force with which it is installed [N/m], tension positive: negative for a strut that is jacked against the walls.
+        fixed_end: whether `end` is held in space, as the middle of a strut on the axis of symmetry, or an anchor in rock outside of
+            the mesh.
+
+    Raises:
+        InputError: a value is out of range.
+
+    Example:
+        >>> strut = mpm.strut((5.0, 8.5), (0.0, 8.5), axial_stiffness=400e6, prestress=-50e3, fixed_end=True)
+    """
+    ends = (start, end)
+    return _checked(
+        Member(ends, axial_stiffness, 0.0, tensile_strength, compressive_strength, math.inf, prestress, False, fixed_end)  # type: ignore[arg-type]
+    )
+
+
+def beam(
+    points: ArrayLike,
+    axial_stiffness: float,
+    bending_stiffness: float,
+    plastic_moment: float = math.inf,
+    spacing: float | None = None,
+) -> Member:
+    """A beam that bends with the soil: a sheet-pile or diaphragm wall, a row of piles, the lining of a tunnel. Plane strain only.
+
+    Its ends are free of moments. Shear strains are left out (Euler and Bernoulli). Where it has to slip along the soil, let the mesh
+    have a thin layer of weaker soil beside it.
+
+    Args:
+        points: two or more points of its line [m], shape (k, 2).
+        axial_stiffness: E A [N/m].
+        bending_stiffness: E I [N m2/m].
+        plastic_moment: largest bending moment [N m/m], at which a plastic hinge forms; by default it stays elastic.
+        spacing: length of the segments into which it is divided [m]; by default about the distance of the nodes around it.
+
+    Raises:
+        InputError: a value is out of range.
+
+    Example:
+        >>> wall = mpm.beam([(5.0, 10.0), (5.0, 2.0)], axial_stiffness=2.7e9, bending_stiffness=44e6)  # AZ 18
+    """
+    positive("bending_stiffness", bending_stiffness, "N m2/m")
+    return _checked(Member(points, axial_stiffness, bending_stiffness, plastic_moment=plastic_moment, spacing=spacing))  # type: ignore[arg-type]
+
+
+def _checked(member: Member) -> Member:
+    """The member, with its points as tuples; raises InputError for values that are not possible."""
+    points = real_numbers("points", member.points)
+    if points.ndim != 2 or len(points) < 2 or points.shape[1] not in (2, 3) or not np.all(np.isfinite(points)):
+        raise InputError(f"points is {points.tolist()}, expected two or more finite points (x, y) or (x, y, z) [m]")
+    if np.any(np.linalg.norm(np.diff(points, axis=0), axis=1) == 0):
+        raise InputError(f"points is {points.tolist()}, expected points that differ from the one before")
+    if member.bending_stiffness and points.shape[1] == 3:
+        raise InputError(
+            "points has three dimensions, expected two: beams are for plane strain, bars and struts for both"
+        )
+    positive("axial_stiffness", member.axial_stiffness, "N/m")
+    for name in ("tensile_strength", "compressive_strength", "plastic_moment"):
+        within(name, getattr(member, name), 0.0, math.inf)
+    if member.tensile_strength == member.compressive_strength == 0:
+        raise InputError(
+            "tensile_strength and compressive_strength are 0, expected one above it: the member carries nothing"
+        )
+    within("prestress", member.prestress, -member.compressive_strength, member.tensile_strength)
+    if member.spacing is not None:
+        positive("spacing", member.spacing, "m")
+    flag("fixed_end", member.fixed_end)
+    object.__setattr__(member, "points", tuple(map(tuple, points.tolist())))
+    return member
+
+
+@dataclass(frozen=True)
+class MemberStrains:
+    """Linear operators from the displacements of a member's nodes to its strains, small rotations.
+
+    Strains are those of its segments, followed by the curvatures at its inner nodes where it bends: the change of direction there
+    over half the length of the two segments beside it (a chain of stiff segments with springs between them, which converges to the
+    beam of Euler and Bernoulli with the square of the segments' length).
+    """
+
+    operator: NDArray[np.float64]
+    """Strain [-] or curvature [1/m] by displacement component, shape (k, n, D)"""
+    lengths: NDArray[np.float64]
+    """Length over which each strain acts [m], shape (k,)"""
+    segments: int
+    """Number of segments, whose axial strains come first"""
+
+
+def member_strains(nodes: NDArray[np.float64], bends: bool) -> MemberStrains:
+    """The strains of a chain of nodes.
+
+    Args:
+        nodes: positions (n, D) [m].
+        bends: whether there are curvatures.
+    """
+    n, dim = nodes.shape
+    edges = np.diff(nodes, axis=0)
+    lengths = np.linalg.norm(edges, axis=1)
+    along = edges / lengths[:, None]
+    axial = np.zeros((n - 1, n, dim))
+    rows = np.arange(n - 1)
+    axial[rows, rows] = -along / lengths[:, None]
+    axial[rows, rows + 1] = along / lengths[:, None]
+    if not bends or n < 3:
+        return MemberStrains(axial, lengths, n - 1)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    rotation = np.zeros((n - 1, n, dim))
+    rotation[rows, rows] = -across / lengths[:, None]
+    rotation[rows, rows + 1] = across / lengths[:, None]
+    halves = (lengths[1:] + lengths[:-1]) / 2
+    curvature = np.diff(rotation, axis=0) / halves[:, None, None]
+    return MemberStrains(np.concatenate([axial, curvature]), np.concatenate([lengths, halves]), n - 1)
+
+
+@dataclass(frozen=True)
+class MemberForces:
+    """Forces of a member, along its line. Those of plane strain are per metre."""
+
+    positions: NDArray[np.float64]
+    """Its nodes as they were installed [m], shape (n, D)"""
+    displacement: NDArray[np.float64]
+    """Their displacement since then [m], shape (n, D)"""
+    axial_force: NDArray[np.float64]
+    """Axial force of each segment [N/m], tension positive, shape (n - 1,)"""
+    moment: NDArray[np.float64]
+    """Bending moment at the nodes [N m/m], 0 at the ends, shape (n,); positive where its left side, seen along its line, is compressed"""
+
+    @property
+    def shear_force(self) -> NDArray[np.float64]:
+        """Shear force of each segment, the change of the moment along it [N/m], shape (n - 1,)."""
+        return np.diff(self.moment) / np.linalg.norm(np.diff(self.positions, axis=0), axis=1)
+
+    def __repr__(self) -> str:
+        axial = f"axial force from {self.axial_force.min():.4g} to {self.axial_force.max():.4g} N/m"
+        moment = (
+            f", moment from {self.moment.min():.4g} to {self.moment.max():.4g} N m/m" if np.any(self.moment) else ""
+        )
+        return f"<MemberForces: {len(self.positions)} nodes, {axial}{moment}>"
+
+
+def of_members(members: Any) -> dict[str, Member]:
+    """A dictionary of members by name; raises InputError for anything else."""
+    if not isinstance(members, dict) or not all(isinstance(one, Member) for one in members.values()):
+        raise InputError(
+            f"members is {members!r}, expected a dictionary of what `bar`, `strut` and `beam` return, by name"
+        )
+    return dict(members)

@@ -1,0 +1,180 @@
+"""Results of structural members after each stage: a table, points for ParaView, and pictures of walls and of axial forces."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from mpm_core.collective import on_first_rank
+from mpm_core.output import ParticleOutput
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+from .files import OutputError, write_text
+from .figures import Pictures, curve_figure
+from .plots import CURVES
+
+COLUMNS = (
+    "stage", "name", "member", "x_m", "y_m", "displacement_x_m", "displacement_y_m", "axial_force_N_per_m",
+    "shear_force_N_per_m", "moment_N_m_per_m",
+)  # fmt: skip
+LEGEND_COLUMNS = 4
+"""Stages beside one another in the legend of a beam"""
+BEAM = "displacement across its line, bending moment, shear force and axial force"
+
+
+@dataclass
+class StageForces:
+    """Forces of the members after a stage: its number and name, and the forces by the name of each member."""
+
+    number: int
+    name: str
+    forces: dict[str, mpm.MemberForces]
+
+
+def stage_forces(site: bridge.FemSite, name: str) -> StageForces:
+    """The forces of all members of a site now. Collective."""
+    return StageForces(site.number, name, {each: site.fem.member_forces(each) for each in site.fem.members})
+
+
+def force_row(stage: StageForces) -> dict[str, float]:
+    """Extreme forces of each member after a stage, for a table; columns are named by the members."""
+    row: dict[str, float] = {}
+    for name, forces in stage.forces.items():
+        key = name.replace(" ", "_")
+        row[f"{key}_axial_force_N_per_m"] = largest(forces.axial_force)
+        if np.any(forces.moment):
+            row[f"{key}_moment_N_m_per_m"] = largest(forces.moment)
+    return row
+
+
+def largest(values: np.ndarray) -> float:
+    """The value that is farthest from 0, with its sign."""
+    return float(values[np.argmax(np.abs(values))])
+
+
+def at_nodes(per_segment: np.ndarray) -> np.ndarray:
+    """Values of segments (n - 1,) as those of the nodes (n,): the mean of the two beside each."""
+    ends = np.concatenate([per_segment[:1], per_segment, per_segment[-1:]])
+    return (ends[1:] + ends[:-1]) / 2
+
+
+def write_members(folder: Path, stages: list[StageForces], comm: MPI.Comm) -> None:
+    """Write ``members.csv``, and the series ``members`` of the nodes for ParaView, where there are members. Collective."""
+    if not any(stage.forces for stage in stages):
+        return
+    on_first_rank(comm, lambda: write_text(folder / "members.csv", _table(stages)), OutputError)
+    with ParticleOutput(folder / "members", comm) as output:
+        for stage in stages:
+            parts = [_fields(forces, number) for number, forces in enumerate(stage.forces.values())] or [
+                _fields(None, 0)
+            ]
+            fields = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+            mine = slice(None) if comm.rank == 0 else slice(0)
+            output.write(float(stage.number), {name: values[mine] for name, values in fields.items()})
+
+
+def member_pictures(stages: list[StageForces], folder: Path) -> Pictures:
+    """A picture of each beam, and one of the axial forces of bars and struts over the stages."""
+    names = list(dict.fromkeys(name for stage in stages for name in stage.forces))
+    bending = [name for name in names if any(np.any(s.forces[name].moment) for s in stages if name in s.forces)]
+    pictures: dict[str, Any] = {}
+    for name in bending:
+        path = folder / f"{file_name(name)}.png"
+        pictures[path.stem] = lambda name=name, path=path: save_beam(path, name, stages)
+    if straight := [name for name in names if name not in bending]:
+        pictures["axial_forces"] = lambda: save_axial_forces(folder / "axial_forces.png", straight, stages)
+    return pictures
+
+
+def captions(stages: list[StageForces]) -> dict[str, str]:
+    """Captions of `member_pictures`, by file name."""
+    names = dict.fromkeys(name for stage in stages for name in stage.forces)
+    beams = {file_name(name): f"Member {name} after each stage: {BEAM}" for name in names}
+    return {**beams, "axial_forces": "Largest axial force of each bar and strut after each stage; tension is positive"}
+
+
+def file_name(member: str) -> str:
+    """Name of the picture of a beam."""
+    return "member_" + "".join(c if c.isalnum() else "_" for c in member)
+
+
+def save_beam(path: Path, name: str, stages: list[StageForces]) -> None:
+    """Displacement across a beam, moment, shear and axial force over its height, or its length where it is flat."""
+    shown = [stage for stage in stages if name in stage.forces]
+    extent = np.ptp(shown[0].forces[name].positions, axis=0)
+    upright = bool(extent[1] >= extent[0])
+    rows, columns = (1, 4) if upright else (4, 1)
+    with curve_figure(path, (6.9, 4.0) if upright else (5.4, 7.4), columns, rows) as panels:
+        for k, stage in enumerate(shown):
+            forces = stage.forces[name]
+            along, place = (1, "Height [m]") if upright else (0, "x [m]")
+            across = forces.displacement[:, 0 if upright else 1]
+            nodes = forces.positions[:, along]
+            ends = np.column_stack(
+                [nodes[:-1], nodes[1:]]
+            ).ravel()  # of the segments, whose forces jump where a strut is
+            curves = {
+                "Displacement [mm]": (1e3 * across, nodes),
+                "Moment [kN m/m]": (1e-3 * forces.moment, nodes),
+                "Shear force [kN/m]": (1e-3 * np.repeat(forces.shear_force, 2), ends),
+                "Axial force [kN/m]": (1e-3 * np.repeat(forces.axial_force, 2), ends),
+            }
+            style = {"color": CURVES[k % len(CURVES)], "linewidth": 1.1, "label": stage.name, "marker": ""}
+            for axes, (label, (values, where)) in zip(panels, curves.items()):
+                axes.plot(*((values, where) if upright else (where, values)), **style)
+                (axes.set_xlabel if upright else axes.set_ylabel)(label)
+                (axes.axvline if upright else axes.axhline)(0.0, color="black", linewidth=0.5)
+        if upright:
+            panels[0].set_ylabel(place)
+            for axes in panels[1:]:
+                axes.tick_params(labelleft=False)
+        else:
+            panels[-1].set_xlabel(place)
+        figure, lines = panels[0].figure, -(-len(shown) // LEGEND_COLUMNS)
+        room = (0.2 * lines + 0.1) / figure.get_size_inches()[1]
+        figure.get_layout_engine().set(rect=(0, 0, 1, 1 - room))
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="upper center", ncol=LEGEND_COLUMNS, fontsize=8)
+
+
+def save_axial_forces(path: Path, names: list[str], stages: list[StageForces]) -> None:
+    """Largest axial force of bars and struts after each stage."""
+    shown = [stage for stage in stages if stage.forces]
+    with curve_figure(path, (5.4, 3.4)) as axes:
+        for k, name in enumerate(names):
+            values = [1e-3 * largest(s.forces[name].axial_force) if name in s.forces else np.nan for s in shown]
+            axes.plot(range(len(shown)), values, "o-", color=CURVES[k % len(CURVES)], markersize=3.5, label=name)
+        axes.set_xticks(range(len(shown)), [stage.name for stage in shown], rotation=25, ha="right")
+        axes.set(xlabel="Stage", ylabel="Axial force [kN/m]")
+        axes.axhline(0, color="black", linewidth=0.5)
+        axes.legend(fontsize=8)
+
+
+def _table(stages: list[StageForces]) -> str:
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(COLUMNS)
+    for stage in stages:
+        for name, forces in stage.forces.items():
+            values = np.column_stack([forces.positions, forces.displacement, at_nodes(forces.axial_force),
+                                      at_nodes(forces.shear_force), forces.moment])  # fmt: skip
+            rows.writerows([stage.number, stage.name, name, *(f"{value:.6g}" for value in row)] for row in values)
+    return text.getvalue()
+
+
+def _fields(forces: mpm.MemberForces | None, number: int) -> dict[str, np.ndarray]:
+    """Fields of the nodes of a member; none of them where there is no member."""
+    if forces is None:
+        return {"position": np.zeros((0, 2)), "displacement": np.zeros((0, 2)), "member": np.zeros(0, dtype=int),
+                "axial_force": np.zeros(0), "shear_force": np.zeros(0), "moment": np.zeros(0)}  # fmt: skip
+    return {
+        "position": forces.positions, "displacement": forces.displacement,
+        "member": np.full(len(forces.positions), number), "axial_force": at_nodes(forces.axial_force),
+        "shear_force": at_nodes(forces.shear_force), "moment": forces.moment,
+    }  # fmt: skip

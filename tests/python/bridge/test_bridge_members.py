@@ -1,0 +1,229 @@
+"""Bars, struts and beams in finite elements: against closed forms of bars, beams and sliding blocks."""
+
+import math
+
+import numpy as np
+import pytest
+from dolfinx.mesh import compute_midpoints, meshtags
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+COMM = MPI.COMM_WORLD
+LEFT, RIGHT, BOTTOM, TOP = 1, 2, 3, 4
+
+
+def body(lengths, counts, law, supports, **options):
+    domain, cell_tags, facet_tags = bridge.box_mesh(COMM, lengths, counts)
+    return bridge.QuasiStatic(domain, law, facet_tags, supports, cell_tags=cell_tags, **options)
+
+
+@pytest.mark.parametrize("options", [{"degree": 1}, {"degree": 2}, {"degree": 4}, {"degree": 1, "nmd": True}])
+def test_a_bar_and_soil_share_the_force_of_a_plate_by_their_stiffness(options):
+    young, stiffness, strain = 1e6, 3e6, 0.005
+    supports = [bridge.roller(BOTTOM, (0, 1)), bridge.roller(LEFT, (1, 0)), bridge.prescribed(TOP, (None, -2 * strain))]
+    fem = body((1.0, 2.0), (4, 8), mpm.LinearElastic(young=young, poisson=0.0), supports, **options)
+    fem.reconfigure(members={"bar": mpm.bar([(0.43, 0.0), (0.43, 2.0)], stiffness)})  # on no line of the mesh
+    fem.solve(bridge.Load(displacement=1.0))
+    forces = fem.member_forces("bar")
+    assert np.allclose(forces.axial_force, -stiffness * strain, rtol=1e-9)
+    assert fem.reaction(TOP)[1] == pytest.approx(young * strain + stiffness * strain, rel=1e-9)
+    assert np.allclose(forces.displacement[:, 1], -strain * forces.positions[:, 1], atol=1e-12)
+
+
+def test_a_bar_in_three_dimensions_carries_its_share():
+    supports = [bridge.roller(5, (0, 0, 1)), bridge.roller(1, (1, 0, 0)), bridge.roller(3, (0, 1, 0)),
+                bridge.prescribed(6, (None, None, -0.01))]  # fmt: skip
+    fem = body((1.0, 1.0, 2.0), (2, 2, 4), mpm.LinearElastic(young=1e6, poisson=0.0), supports, degree=1)
+    fem.reconfigure(members={"bar": mpm.bar([(0.3, 0.6, 0.0), (0.3, 0.6, 2.0)], 3e6)})
+    fem.solve(bridge.Load(displacement=1.0))
+    assert np.allclose(fem.member_forces("bar").axial_force, -3e6 * 0.005, rtol=1e-8)
+    assert fem.reaction(6)[2] == pytest.approx((1e6 + 3e6) * 0.005, rel=1e-8)
+
+
+def simply_supported(cells, degree=2):
+    """Deflection and moments of a beam on two supports under 1 kPa; the soil below it is 1e5 times softer."""
+    length, pressure, stiffness = 4.0, 1e3, 1e6
+    supports = [bridge.roller(LEFT, (0, 1)), bridge.prescribed(RIGHT, (0.0, 0.0))]
+    fem = body((length, 0.5), (cells, 2), mpm.LinearElastic(young=1e-3, poisson=0.0), supports, degree=degree)
+    fem.reconfigure(members={"beam": mpm.beam([(0.0, 0.5), (length, 0.5)], 1e8, stiffness)})
+    fem.solve(bridge.Load(pressure={TOP: pressure}))
+    return fem.member_forces("beam"), 5 * pressure * length**4 / (384 * stiffness), pressure * length**2 / 8
+
+
+def test_a_beam_on_two_supports_bends_as_by_euler_and_bernoulli():
+    errors = []
+    for cells in (8, 16):
+        forces, deflection, moment = simply_supported(cells)
+        errors.append(-forces.displacement[:, 1].min() / deflection - 1)
+        assert forces.moment.max() == pytest.approx(moment, rel=1e-4)
+    assert errors[0] < 0.01
+    assert errors[1] == pytest.approx(errors[0] / 4, rel=0.02)  # second order
+
+
+def test_moment_and_shear_follow_the_convention_of_their_docstring():
+    forces, _, moment = simply_supported(8)
+    # Loaded from above its upper side, the left one seen along it, is compressed, so that the moment is positive. The pressure on a
+    # quadratic element acts at the middle of its edge by two thirds: moments are exact at the corners.
+    x = forces.positions[::2, 0]
+    assert np.allclose(forces.moment[::2], 1e3 * x * (4 - x) / 2, atol=1e-4 * moment)
+    assert np.allclose(forces.shear_force.reshape(-1, 2).mean(axis=1), 1e3 * (2 - (x[1:] + x[:-1]) / 2), atol=0.2)
+
+
+def test_a_plastic_hinge_limits_the_moment_and_the_soil_carries_the_rest():
+    length, limit = 4.0, 1e3
+    supports = [bridge.fixed(BOTTOM), bridge.roller(LEFT, (0, 1)), bridge.roller(RIGHT, (0, 1))]
+
+    def solved(plastic_moment):
+        fem = body((length, 1.0), (16, 4), mpm.LinearElastic(young=1e4, poisson=0.0), supports)
+        fem.reconfigure(members={"beam": mpm.beam([(0.0, 1.0), (length, 1.0)], 1e8, 1e6, plastic_moment)})
+        fem.solve(bridge.Load(pressure={TOP: 1e3}))
+        assert fem.converged
+        return fem.member_forces("beam")
+
+    elastic, plastic = solved(math.inf), solved(limit)
+    assert 1.2 * limit < elastic.moment.max() < 1e3 * length**2 / 8
+    assert plastic.moment.max() == pytest.approx(limit)
+    assert -plastic.displacement[:, 1].min() > 1.2 * -elastic.displacement[:, 1].min()
+
+
+def test_a_strut_is_a_spring_between_soil_and_a_fixed_point():
+    stiffness, length, pressure = 5e6, 2.0, 20e3
+    fem = body((3.0, 1.0), (12, 4), mpm.LinearElastic(young=5e6, poisson=0.2), [bridge.fixed(LEFT)])
+    fem.reconfigure(members={"strut": mpm.strut((3.0, 0.5), (3.0 + length, 0.5), stiffness, fixed_end=True)})
+    fem.solve(bridge.Load(pressure={RIGHT: -pressure}))  # pulls the body against the strut
+    forces = fem.member_forces("strut")
+    moved = forces.displacement[0, 0]
+    assert forces.axial_force == pytest.approx([-stiffness * moved / length], rel=1e-9)
+    assert moved > 0
+    assert forces.displacement[1] == pytest.approx([0.0, 0.0])
+    assert fem.reaction(LEFT)[0] == pytest.approx(pressure + forces.axial_force[0], rel=1e-6)  # it pulls at the support
+
+
+def test_a_prestress_is_that_at_the_end_of_its_stage_and_then_follows_the_strain(tmp_path):
+    fem = body((3.0, 1.0), (12, 4), mpm.LinearElastic(young=5e6, poisson=0.2), [bridge.fixed(LEFT)])
+    site = bridge.FemSite(fem)
+    tie = mpm.strut((3.0, 0.5), (5.0, 0.5), 5e6, prestress=30e3, fixed_end=True)
+    tags = fem.soils
+    site.carry_out(bridge.Stage("ground", fill=tags, unit_weight=dict.fromkeys(tags, 0.0)))
+    site.carry_out(bridge.Stage("tie", install={"tie": tie}))
+    assert fem.member_forces("tie").axial_force == pytest.approx([30e3])
+    pulled = fem.member_forces("tie").displacement[0, 0]
+    assert pulled > 0
+    site.carry_out(bridge.Stage("pull", pressure={RIGHT: -10e3}))
+    forces = fem.member_forces("tie")
+    slackened = forces.displacement[0, 0] - pulled
+    assert slackened > 0
+    assert forces.axial_force == pytest.approx([30e3 - 5e6 * slackened / 2.0], rel=1e-9)
+    site.carry_out(bridge.Stage("without", pressure={RIGHT: 0.0}, remove="tie"))
+    assert fem.members == {}
+    assert np.abs(fem.displacement.x.array).max() < 1e-9  # elastic: all of it has gone back
+
+
+def test_a_prestress_that_a_load_without_stages_has_reached_follows_the_strain():
+    fem = body((3.0, 1.0), (12, 4), mpm.LinearElastic(young=5e6, poisson=0.2), [bridge.fixed(LEFT)])
+    fem.reconfigure(members={"tie": mpm.strut((3.0, 0.5), (5.0, 0.5), 5e6, prestress=30e3, fixed_end=True)})
+    fem.solve(bridge.Load(pressure={RIGHT: 5e3}))
+    assert fem.member_forces("tie").axial_force == pytest.approx([30e3])
+    before = fem.member_forces("tie").displacement[0, 0]
+    fem.solve(bridge.Load(pressure={RIGHT: 0.0}))
+    forces = fem.member_forces("tie")
+    assert forces.axial_force == pytest.approx([30e3 - 5e6 * (forces.displacement[0, 0] - before) / 2.0], rel=1e-9)
+    assert forces.axial_force[0] < 30e3
+
+
+def slab(thick=0.1):
+    """A strong slab 6 m long on a thin layer of clay on a rigid base; the strength of the clay is 10 kPa."""
+    domain, _, facet_tags = bridge.box_mesh(COMM, (6.0, 0.3), (60, 6))
+    cells = np.arange(bridge.original_cells(domain).size, dtype=np.int32)
+    height = compute_midpoints(domain, 2, cells)[:, 1]
+    cell_tags = meshtags(domain, 2, cells, np.where(height < thick, 1, 2).astype(np.int32))
+    laws = {1: mpm.tresca(young=20e6, poisson=0.3, shear_strength=10e3), 2: mpm.LinearElastic(young=200e6, poisson=0.3)}
+    return bridge.QuasiStatic(domain, laws, facet_tags, [bridge.fixed(BOTTOM)], cell_tags=cell_tags)
+
+
+@pytest.mark.parametrize("strength", [0.0, 15e3])
+def test_a_slab_on_clay_slides_under_the_strength_of_the_clay_and_of_its_tie(strength):
+    """Limit analysis: a horizontal traction t on the top slides the slab at t L = s_u L + T."""
+    fem = slab()
+    if strength:
+        tie = mpm.strut((0.05, 0.2), (-3.0, 0.2), 50e6, tensile_strength=strength, fixed_end=True)
+        fem.reconfigure(members={"tie": tie})
+    found = bridge.collapse_load(fem, lambda t: bridge.Load(traction={TOP: (t, 0.0)}), first_step=2e3)
+    assert found.failed
+    assert found.value == pytest.approx(10e3 + strength / 6.0, rel=0.015)
+    if strength:
+        assert fem.member_forces("tie").axial_force == pytest.approx([strength])
+
+
+def test_the_factor_of_safety_leaves_the_strength_of_members_as_it_is():
+    """t L = s_u L / F + T."""
+    fem, traction, strength = slab(), 9e3, 20e3
+    fem.reconfigure(
+        members={"tie": mpm.strut((0.05, 0.2), (-3.0, 0.2), 50e6, tensile_strength=strength, fixed_end=True)}
+    )
+    found = bridge.factor_of_safety(fem, bridge.Load(traction={TOP: (traction, 0.0)}), start=1.0)
+    assert found.failed
+    assert found.value == pytest.approx(10e3 / (traction - strength / 6.0), rel=0.015)
+
+
+def test_a_geogrid_carries_no_compression():
+    supports = [bridge.roller(BOTTOM, (0, 1)), bridge.roller(LEFT, (1, 0)), bridge.prescribed(TOP, (None, -0.01))]
+    fem = body((1.0, 2.0), (4, 8), mpm.LinearElastic(young=1e6, poisson=0.0), supports)
+    fem.reconfigure(members={"grid": mpm.bar([(0.4, 0.0), (0.4, 2.0)], 3e6, compressive_strength=0.0)})
+    fem.solve(bridge.Load(displacement=1.0))
+    assert np.all(fem.member_forces("grid").axial_force == 0.0)
+    assert fem.reaction(TOP)[1] == pytest.approx(1e6 * 0.005, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: mpm.bar([(0, 0)], 1e6), "points is .*, expected two or more"),
+        (lambda: mpm.bar([(0, 0), (0, 0)], 1e6), "expected points that differ"),
+        (lambda: mpm.bar([(0, 0), (1, 0)], 0.0), "axial_stiffness is 0.0 N/m, expected a positive number"),
+        (lambda: mpm.bar([(0, 0), (1, 0)], 1e6, tensile_strength=-1.0), "tensile_strength is -1.0"),
+        (lambda: mpm.bar([(0, 0), (1, 0)], 1e6, tensile_strength=0.0, compressive_strength=0.0), "carries nothing"),
+        (lambda: mpm.bar([(0, 0), (1, 0)], 1e6, tensile_strength=1e3, prestress=2e3), "prestress is 2000.0"),
+        (lambda: mpm.bar([(0, 0), (1, 0)], 1e6, spacing=-1.0), "spacing is -1.0 m"),
+        (lambda: mpm.beam([(0, 0), (1, 0)], 1e6, 0.0), "bending_stiffness is 0.0"),
+        (lambda: mpm.beam([(0, 0, 0), (1, 0, 0)], 1e6, 1e6), "beams are for plane strain"),
+        (lambda: mpm.strut((0, 0), (1, 0), 1e6, fixed_end="yes"), "fixed_end is 'yes'"),
+    ],
+)
+def test_members_that_cannot_be_name_what_is_wrong(make, message):
+    with pytest.raises(mpm.InputError, match=message):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("members", "message"),
+    [
+        ({"wall": mpm.bar([(0.5, 0.5), (0.5, 3.0)], 1e6)}, "member 'wall': the point .* is in no soil"),
+        ({"nail": mpm.bar([(0, 0, 0), (1, 0, 0)], 1e6)}, "members: 'nail' has 3 dimensions, expected 2"),
+        ({"nail": 3}, "members is .*, expected a dictionary"),
+    ],
+)
+def test_members_that_do_not_fit_the_body_change_nothing(members, message):
+    fem = body((1.0, 2.0), (2, 4), mpm.LinearElastic(young=1e6, poisson=0.0), [bridge.fixed(BOTTOM)])
+    with pytest.raises(mpm.InputError, match=message):
+        fem.reconfigure(members=members)
+    assert fem.members == {}
+
+
+def test_stages_that_install_and_remove_what_is_not_there_are_errors():
+    fem = body((1.0, 2.0), (2, 4), mpm.LinearElastic(young=1e6, poisson=0.0), [bridge.fixed(BOTTOM)])
+    site, nail = bridge.FemSite(fem), mpm.bar([(0.2, 0.5), (0.8, 0.5)], 1e6)
+    weights = dict.fromkeys(fem.soils, 20e3)
+    site.carry_out(bridge.Stage("ground", fill=fem.soils, unit_weight=weights, install={"nail": nail}))
+    with pytest.raises(mpm.InputError, match=r"stage 'twice': install: the member 'nail' is there already"):
+        site.carry_out(bridge.Stage("twice", install={"nail": nail}))
+    with pytest.raises(
+        mpm.InputError, match=r"stage 'none': remove: there is no member 'tie', expected one of \['nail'\]"
+    ):
+        site.carry_out(bridge.Stage("none", remove="tie"))
+    with pytest.raises(mpm.InputError, match="stage 'list': install is .*, expected a dictionary"):
+        site.carry_out(bridge.Stage("list", install=[nail]))
+    with pytest.raises(mpm.InputError, match=r"name is 'tie', expected one of \['nail'\]"):
+        fem.member_forces("tie")

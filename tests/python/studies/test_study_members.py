@@ -1,0 +1,94 @@
+"""Studies of sites with walls and struts."""
+
+import csv
+import importlib
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+
+import mpm_core as mpm
+
+ROOT = Path(__file__).parents[3]
+sys.path.insert(0, str(ROOT / "studies"))
+SITE = (ROOT / "meshes" / "braced_excavation.toml").read_text()
+site_file = importlib.import_module("common.site_file")
+
+
+def site_in(folder, text=SITE):
+    (folder / "braced_excavation.geo").write_text((ROOT / "meshes" / "braced_excavation.geo").read_text())
+    (folder / "site.toml").write_text(text)
+    return folder / "site.toml"
+
+
+@pytest.fixture(scope="module")
+def braced(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("braced")
+    excavation = importlib.import_module("excavation")
+    options = f"--site {site_in(folder)} --cell-size 2 --output {folder / 'out'}"
+    assert excavation.main(options.split()) == 0
+    with open(folder / "out" / "members.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    return folder / "out", rows
+
+
+def test_the_table_has_the_forces_of_each_member_after_each_stage(braced):
+    folder, rows = braced
+    summary = json.loads((folder / "summary.json").read_text())
+    last = summary["stages"][-1]
+    struts = {row["member"]: float(row["axial_force_N_per_m"]) for row in rows if row["name"] == "cut to 6 m"}
+    assert struts["lower strut"] == pytest.approx(last["lower_strut_axial_force_N_per_m"], rel=1e-5)
+    at_once = [float(row["axial_force_N_per_m"]) for row in rows if row["name"] == row["member"] == "upper strut"]
+    assert at_once == pytest.approx([-20e3, -20e3])  # its prestress, at the end of its stage
+    moments = [
+        float(row["moment_N_m_per_m"]) for row in rows if row["member"] == "wall" and row["name"] == "cut to 6 m"
+    ]
+    assert max(moments, key=abs) == pytest.approx(last["wall_moment_N_m_per_m"], rel=1e-5)
+    assert moments[0] == moments[-1] == 0.0
+    assert (folder / "members.xdmf").exists()
+
+
+def test_struts_carry_the_earth_pressure_that_the_ground_below_does_not(braced):
+    """Active pressure on 6 m of wall with K_a of 33 degrees and 1 kPa, of which the ground below the pit carries a part."""
+    _, rows = braced
+    struts = {row["member"]: -float(row["axial_force_N_per_m"]) for row in rows if row["name"] == "cut to 6 m"}
+    ka = 0.295
+    active = ka * 19e3 * 6**2 / 2 - 2 * 1e3 * ka**0.5 * 6
+    assert 0.6 * active < struts["upper strut"] + struts["lower strut"] < 1.5 * active
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('kind = "beam"', 'kind = "pile"', r"members.wall: kind is 'pile', expected one of 'bar', 'strut', 'beam'"),
+        ("bending_stiffness = 79e6", "bending_stifness = 79e6", "members.wall: .*bending_stifness.*bending_stiffness"),
+        ("axial_stiffness = 2.9e9", "", "members.wall: .*axial_stiffness"),
+        ("axial_stiffness = 2.9e9", "axial_stiffness = -1.0", "members.wall: axial_stiffness is -1.0 N/m"),
+        ("points = [[5.0, 20.0], [5.0, 9.0]]", "", "members.wall has no points"),
+        ("points = [[5.0, 19.0], [0.0, 19.0]]", "points = [[5.0, 19.0]]", "upper strut: points is .*, expected the two ends"),
+        ('install = ["wall"]', 'install = ["pile"]', r"stages\[1\]: 'pile' is not among the tables \[members.NAME\]: wall"),
+        ('install = ["wall"]', "install = 3", r"stages\[1\]: install is 3, expected names"),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_a_member_is_named(tmp_path, old, new, message):
+    assert old in SITE
+    with pytest.raises(mpm.InputError, match=message):
+        site_file.read_site(site_in(tmp_path, SITE.replace(old, new)), MPI.COMM_WORLD, 4.0)
+
+
+def test_studies_that_have_all_soils_at_once_say_that_they_leave_members_out(tmp_path):
+    site = site_file.read_site(site_in(tmp_path), MPI.COMM_WORLD, 4.0)
+    assert "install of 'wall'" in site.left_out_at_once()
+
+
+def test_a_braced_pit_has_a_factor_of_safety_and_fails_without_its_members(tmp_path):
+    safety = importlib.import_module("safety")
+    options = f"--site {site_in(tmp_path)} --cell-size 3 --meshes 1 --start 0.8 --output {tmp_path / 'with'}"
+    assert safety.main(options.split()) == 0
+    assert json.loads((tmp_path / "with" / "summary.json").read_text())["factor_of_safety"] > 1.5
+    without = site_in(tmp_path, "".join(line for line in SITE.splitlines(True) if not line.startswith("install")))
+    options = f"--site {without} --cell-size 3 --meshes 1 --start 0.8 --output {tmp_path / 'without'}"
+    with pytest.raises(mpm.InputError, match=r"only \d.*% of the load is carried"):
+        safety.main(options.split())
