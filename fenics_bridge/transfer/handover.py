@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -109,6 +109,7 @@ def initialise(
             ones, without suction where they have retention curves, and `equilibrate` keeps these. Particles of `Undrained` laws,
             whose skeletons are the laws of a `QuasiStatic` with prescribed pore pressures, take total stresses, and the pressures
             as their `excess_pore_pressure`; particles of other laws may lie beside them where there are no pore pressures.
+            Its structural members are installed in the model with their forces; `equilibrate` must be False then.
         count_displacement: let displacements of particles include those of the finite elements; otherwise they start from zero.
         move: move particles with the body, by its displacement; otherwise they stay where they are, with their volume.
             Volumes of particles that move change with the body's, and are then fitted to what each cell of their mesh holds
@@ -164,6 +165,7 @@ def initialise(
         _require_same_laws(model, fem, number)
     returned = _take_stress_and_state(model, fem, search, smooth)
     _displace(model, fem.displacement, search, move, count_displacement)
+    _take_members(model, fem, move)
     averaged = getattr(fem, "_nmd", False) if nmd is None else nmd
     before = model.out_of_balance(nmd=averaged, integration=integration)
     had_yielded = int(np.sum(particles.plastic_strain > 0))
@@ -246,7 +248,8 @@ def _require_usable(
         else "model has no particles, expected some: seed them before",
     )
     agree(model.comm, _water_mistake(model, fem) or prescribed_mistake(model, fem))
-    agree(model.comm, _not_equilibrated(model, integration) if equilibrate else None)
+    agree(model.comm, _not_equilibrated(model, fem, integration) if equilibrate else None)
+    agree(model.comm, _members_mistake(model, fem))
     agree(model.comm, _rising_gravity(model))
     known = not move or hasattr(model.mesh, "domain")
     agree(model.comm, None if known else "model: to move particles its mesh must come from `background_mesh`")
@@ -263,11 +266,28 @@ def _water_mistake(model: mpm.Model, fem: Any) -> str | None:
     return None if wet or not coupled else f"fem is a {name}, expected particles with pore water (Model.add_water)"
 
 
-def _not_equilibrated(model: mpm.Model, integration: mpm.Integration | None) -> str | None:
+def _not_equilibrated(model: mpm.Model, fem: Any, integration: mpm.Integration | None) -> str | None:
     """Why `Model.equilibrate` would refuse a model, in words; None if it would not."""
-    beyond = beyond_equilibrium(model, integration)
+    beyond = beyond_equilibrium(model, integration) or ("structural members" if getattr(fem, "members", None) else "")
     words = f"equilibrate is True, expected False with {beyond}, which Model.equilibrate does not support"
     return words if beyond else None
+
+
+def _members_mistake(model: mpm.Model, fem: Any) -> str | None:
+    """A structural member that both have, in words; None without."""
+    both = next((name for name in getattr(fem, "members", ()) if name in model.members), None)
+    return (
+        None if both is None else f"model has the member {both!r}, expected it in fem only, from where it is taken over"
+    )
+
+
+def _take_members(model: mpm.Model, fem: Any, move: bool) -> None:
+    """Install the structural members of the finite elements, with their forces. Collective."""
+    members = getattr(fem, "members", {})
+    forces = {name: fem.member_forces(name) for name in members}
+    if not move:
+        forces = {name: replace(one, displacement=np.zeros_like(one.displacement)) for name, one in forces.items()}
+    model.install(members, forces)
 
 
 def _rising_gravity(model: mpm.Model) -> str | None:

@@ -73,6 +73,11 @@ double critical_time_step(const Model<G>& model)
   return root_of_least(critical_particle(model).squared_time, model.exchange.comm);
 }
 
+double critical_with_members(double critical, double squared_frequency)
+{
+  return 1 / std::sqrt(1 / (critical * critical) + squared_frequency / 4);
+}
+
 template <class G>
 double critical_time_step_of_soil(const Model<G>& model)
 {

@@ -26,6 +26,11 @@ CriticalParticle critical_particle(const Model<G>& model);
 template <class G>
 double critical_time_step(const Model<G>& model);
 
+/// The critical step of cells together with that of structural members: squares of frequencies add up. [s]
+/// @param critical  of the cells
+/// @param squared_frequency  see `squared_frequency_of_members`
+double critical_with_members(double critical, double squared_frequency);
+
 /// The same of the stresses and the mass of the soil alone where its water has a velocity of its own, which bounds the
 /// damping by viscous stresses; else `critical_time_step`. [s]
 /// @note Collective

@@ -13,6 +13,7 @@
 #include "model/integration.h"
 #include "model/mapping.h"
 #include "model/material_points.h"
+#include "model/members.h"
 #include "model/pressure_relaxation.h"
 #include "model/reproducible.h"
 #include "model/resting_nodes.h"
@@ -45,6 +46,7 @@ template <class G>
 void add_nodal_forces(Model<G>& model, const ExplicitOptions& options, double dt, VelocityField<G>& field)
 {
   add_contact_forces(model, dt, field);
+  add_member_forces(model, field);
   add_rayleigh_forces(model, options.rayleigh, field);
   add_forces_of_ground(model.mesh, gravity_at(model, model.time), model.time, dt, field);
 }
@@ -235,6 +237,7 @@ void explicit_step(Model<G>& model, const ExplicitOptions& options, double dt)
   if (model.failure)
     return;
   end_contacts(model, {model.time, dt});
+  move_members(model, dt);
   const VelocityField<G>* water = has_two_phases(model) ? &model.water_field.motion : nullptr;
   for (VelocityField<G>& field : model.fields)
     move_springs(model.mesh, model.time + 0.5 * dt, dt, field, water);

@@ -3,6 +3,7 @@
 #include "explicit/critical_step.h"
 #include "materials/laws/substeps.h"
 #include "model/contacts.h"
+#include "model/members.h"
 #include "model/moving_cells.h"
 #include "model/moving_limits.h"
 #include "model/resting_nodes.h"
@@ -116,6 +117,7 @@ void require_plain(const Model<G>& model, const ExplicitOptions& options, const 
   refuse(model.particles.resting.present, "resting cells");
   refuse(!model.contacts.empty() || !model.field_contacts.empty(), "contact");
   refuse(model.water.has_value(), "pore water");
+  refuse(!model.members.empty(), "structural members");
   for (const VelocityField<G>& field : model.fields)
     refuse(!field.dashpots.empty() || !field.free_fields.empty(), "absorbing sides");
 }
@@ -154,6 +156,18 @@ void end_transfer(Model<G>& model)
   book.pic_loss -= book.kinetic;
 }
 
+/// @throws InputError what structural members do not cover
+template <class G>
+void require_members(const Model<G>& model)
+{
+  if (model.members.empty())
+    return;
+  if (G::has_hoop || model.fields.size() > 1 || has_two_phases(model))
+    throw InputError(
+        "the model has structural members, expected none in axial symmetry, with several velocity fields or "
+        "with water that has a velocity of its own");
+}
+
 template <class G>
 double next_step(const Model<G>& model, const RunOptions& run, double critical)
 {
@@ -175,6 +189,7 @@ template <class G>
 std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const RunOptions& run)
 {
   require_integration(model, options);
+  require_members(model);
   ExplicitOptions of_step = options;
   of_step.has_dashpots = has_dashpots(model, options.stress_update);
   if (options.reproducible)
@@ -187,6 +202,7 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
     reset_cells(model);
   begin_transfer(model, options.transfer);
   prepare(model);
+  begin_members(model);
   if (options.moving_cells)
     begin_moving_cells(model);
   std::int64_t done = 0;
@@ -199,8 +215,11 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
       note_largest_work(model);
       if (run.conversion)
         convert_failing(model, *run.conversion);
-      const double critical = critical_time_step(model);
-      const double of_soil = options.rayleigh.stiffness > 0 ? critical_time_step_of_soil(model) : critical;
+      const double of_members = squared_frequency_of_members(model);
+      const double critical = critical_with_members(critical_time_step(model), of_members);
+      const double of_soil = options.rayleigh.stiffness > 0
+                                 ? critical_with_members(critical_time_step_of_soil(model), of_members)
+                                 : critical;
       dt = next_step(model, run, damped_time_step(options.rayleigh, critical, of_soil));
       convert_near_surfaces(model, control_interval * dt);
       of_step.pic_fraction = pic_fraction_of_step(run.pic, dt, critical);

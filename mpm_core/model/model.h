@@ -7,6 +7,7 @@
 #include "materials/laws/law.h"
 #include "model/energy.h"
 #include "model/field_contact.h"
+#include "model/member.h"
 #include "model/pore_water.h"
 #include "model/water_field.h"
 #include "parallel/far_search.h"
@@ -124,6 +125,8 @@ struct Model
   std::vector<Contact<D>> contacts;            ///< with rigid surfaces
   std::vector<Collision> collisions;           ///< of rigid bodies among one another
   std::vector<FieldContact<D>> field_contacts; ///< of velocity fields among one another
+  std::vector<Member<D>> members;              ///< structural ones, in explicit steps
+  std::vector<double> volume_around;           ///< per node, of the cells around it; where there are members [m^D]
   std::optional<PoreWater> water;              ///< in the pores of the soil
   WaterField<G> water_field;                   ///< its motion, where it has its own; see `has_two_phases`
   std::vector<Index> outflow_tags;

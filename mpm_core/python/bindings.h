@@ -18,6 +18,7 @@ void bind_meshes(pybind11::module_& m);
 void bind_options(pybind11::module_& m);
 void bind_models(pybind11::module_& m);
 void bind_contacts(pybind11::module_& m);
+void bind_members(pybind11::module_& m);
 void bind_implicit(pybind11::module_& m);
 void bind_checkpoints(pybind11::module_& m);
 

@@ -10,6 +10,7 @@
 #include "model/far_field.h"
 #include "model/integration.h"
 #include "model/mapping.h"
+#include "model/members.h"
 #include "model/moving_cells.h"
 #include "model/placement.h"
 #include "model/rebalance.h"
@@ -257,7 +258,8 @@ void bind_model(py::module_& m, const std::string& suffix)
            [](M& model)
            {
              prepare(model);
-             return critical_time_step(model);
+             begin_members(model);
+             return critical_with_members(critical_time_step(model), squared_frequency_of_members(model));
            })
       .def("critical_particle",
            [](M& model)
@@ -274,6 +276,9 @@ void bind_model(py::module_& m, const std::string& suffix)
              choose_groups(model, nmd);
              stand_water(model, model.time, gravity);
              map_to_nodes(model);
+             begin_members(model);
+             for (auto& field : model.fields)
+               add_member_forces(model, field);
              return out_of_balance(model, gravity);
            })
       .def("integrated_stress",

@@ -14,6 +14,7 @@ PYBIND11_MODULE(_core, m)
   mpm::python::bind_options(m);
   mpm::python::bind_models(m);
   mpm::python::bind_contacts(m);
+  mpm::python::bind_members(m);
   mpm::python::bind_implicit(m);
   mpm::python::bind_checkpoints(m);
 }

@@ -38,3 +38,46 @@ def test_members_carry_the_same_on_all_numbers_of_ranks():
         for part in ("positions", "displacement", "axial_force", "moment"):
             values, exact = getattr(forces, part), getattr(alone[name], part)
             assert np.allclose(values, exact, rtol=0, atol=1e-6 * max(np.abs(exact).max(), 1e-9))
+
+
+def sliding(comm, rebalance=None):
+    """A leaning wall and a tie in soft ground that slides over the borders of ranks, and what they carry."""
+    domain, cell_tags, facet_tags = bridge.box_mesh(comm, (6.0, 3.0), (24, 12))
+    soil = mpm.LinearElastic(young=0.5e6, poisson=0.2)
+    model = mpm.Model(bridge.background_mesh(domain, cell_tags, facet_tags), soil)
+    x, y = np.meshgrid(np.arange(0.56, 4.5, 0.125), np.arange(0.06, 2.0, 0.125))
+    points = np.stack([x, y], axis=-1).reshape(-1, 2)
+    model.seed_points(points, np.full(len(points), 0.125**2), density=2000.0)
+    model.roller(3, (0, 1))
+    model.set_gravity((4.0, -10.0))
+    members = {
+        "wall": mpm.beam([(2.9, 1.9), (2.9, 0.2)], 1e7, 5e4, plastic_moment=500.0),
+        "tie": mpm.strut((1.5, 1.5), (0.2, 1.5), 2e6, fixed_end=True),
+        "nail": mpm.bar([(3.0, 1.0), (4.2, 0.8)], 5e6, tensile_strength=2e3),
+    }
+    model.install(members)
+    list(model.explicit(until=0.4, rebalance=rebalance))
+    return {name: model.member_forces(name) for name in members}, model.critical_time_step()
+
+
+def require_same(together, alone):
+    assert max(np.abs(forces.axial_force).max() for forces in alone.values()) > 500.0
+    assert np.abs(alone["wall"].moment).max() > 50.0
+    assert np.abs(alone["nail"].displacement).max() > 0.2  # of cells of 0.25 m
+    for name, forces in together.items():
+        for part in ("positions", "displacement", "axial_force", "moment"):
+            values, exact = getattr(forces, part), getattr(alone[name], part)
+            assert np.allclose(values, exact, rtol=0, atol=1e-7 * max(np.abs(exact).max(), 1e-9))
+
+
+def test_particles_move_members_alike_on_all_numbers_of_ranks():
+    alone, step = sliding(MPI.COMM_SELF)
+    together, step_together = sliding(COMM)
+    assert np.isclose(step, step_together, rtol=1e-7)
+    require_same(together, alone)
+
+
+def test_a_new_partition_does_not_change_what_members_carry():
+    alone, _ = sliding(MPI.COMM_SELF)
+    together, _ = sliding(COMM, rebalance=1.01)
+    require_same(together, alone)

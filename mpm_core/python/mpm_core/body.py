@@ -86,6 +86,7 @@ class Body(ParticleValues, PoreWater, RestingCells, AbsorbingSides, FarFields):
         self._border = None
         self._free_fields, self._columns, self._tables, self._free_damping = [], [], [], None
         self._contacts: list[dict[str, Any]] = []  # as checkpoints describe them
+        self._members: dict[str, dict[str, Any]] = {}  # structural ones by name, likewise
         self._collisions: list[dict[str, Any]] = []
         self._field_contacts: list[dict[str, Any]] = []
         self._triangulated: dict[str, Triangles] = {}  # their triangles by fingerprint, which checkpoints do not have

@@ -25,6 +25,7 @@ from .far_field import require_border
 from .field_contact import set_field_contacts
 from .fingerprint import mesh_fingerprint
 from .law_text import law_text
+from .member_methods import members_entry, take_members
 from .rows import find_items
 from .step_control import StepControl
 from .surface_description import require_surfaces
@@ -130,15 +131,18 @@ def restore(model: Model, path: str | os.PathLike[str]) -> None:
                     model.add_field(**field)
         contacts = tuple(there[name] for name in ("contacts", "collisions", "field_contacts"))
         before, water = (model._contacts, model._collisions, model._field_contacts), water_entry(model)
+        members = members_entry(model)
         try:
             with _usable(name):
                 _replace_contacts(model, *contacts)
+                take_members(model, there["members"])
                 take_water(model, there["water"])
                 model._core.set_supports(there["supports"])  # the energy of particles with gradients depends on them
             _core.restore(model._core, *_state(model, file, name, there), name)
         except RunError:
             model._core.set_supports(model._conditions)
             _replace_contacts(model, *before)
+            take_members(model, members)
             take_water(model, water)
             raise
     with _usable(name):
@@ -373,6 +377,7 @@ def _description(model: Model) -> dict[str, Any]:
         "contacts": model._contacts,
         "collisions": model._collisions,
         "field_contacts": model._field_contacts,
+        "members": members_entry(model),
         "water": water_entry(model),
         "absorbing": model._absorbing_state(),
         "far_field": model._border_state(),

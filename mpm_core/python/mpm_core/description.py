@@ -41,6 +41,7 @@ def parsed(path: str, text: bytes) -> dict[str, Any]:
             f"cannot read checkpoint {path}: prescribed in its description names supports that are not there"
         )
     there["contacts"] = [{"drag": 0.0, **contact} for contact in there["contacts"]]  # older files have none
+    there["members"] = there.get("members") or []  # likewise
     return there
 
 
@@ -160,6 +161,7 @@ def _is_contact(value: Any) -> bool:
 _FIELD_CONTACT = {
     "first": _is_count, "second": _is_count, "friction": _is_number, "adhesion": _is_number, "interface": _is_surface
 }  # fmt: skip
+_MEMBER = {"name": str, "member": dict, "positions": [_VECTOR], "state": dict}
 _WATER = {
     "density": _is_number, "modulus": str, "suction_limit": str,  # texts, as they may be infinite
     "kozeny_carman": bool, "drained_surface": bool, "standing": [_PAIR], "rain": [_PAIR], "retention": [[[_is_number]]],
@@ -188,6 +190,7 @@ _ENTRIES: dict[str, tuple[Any, str]] = {
     "added_fields": ([_FIELD], "a list of {name, unit, meaning, components, initial}"),
     "contacts": ([_is_contact], "a list of contacts with rigid surfaces"),
     "field_contacts": ([_FIELD_CONTACT], "a list of contacts between velocity fields"),
+    "members": (AnyOf([_NONE, [_MEMBER]]), "a list of structural members"),  # null in older files
     "far_field": (AnyOf([_NONE, _is_border]), "null, or forces and displacements of its border"),
     "water": (AnyOf([_NONE, _WATER, _OLD_WATER]), "null, or the properties of the pore water"),
     "geometry": (set(Geometry.__members__), f"one of {', '.join(Geometry.__members__)}"),

@@ -23,6 +23,7 @@ def beyond_equilibrium(model: Model, integration: Integration | None = None) -> 
     fields = 1 + max(model._velocity_fields)
     beyond = {
         f"contact with rigid surfaces ({surfaces})": model._contacts,
+        "structural members": model._members,
         "sides that absorb waves": model._absorbing,
         f"{fields} velocity fields": fields > 1,
         "pore water with a velocity of its own since explicit()": model._core.has_two_phases,

@@ -29,6 +29,7 @@ from .far_field import refuse_far_field
 from .ghost import GhostPenalty
 from .implicit import checked_accuracy, implicit_options, run_implicit
 from .integration import integration_of
+from .member_methods import MemberMethods, refuse_members
 from .mesh import floats
 from .newton import Newton
 from .partition import rebalance_threshold
@@ -46,7 +47,7 @@ CONVERSION = Conversion()
 """When resting cells turn into particles, unless a run is given other criteria"""
 
 
-class Model(ContactMethods, Body):
+class Model(ContactMethods, MemberMethods, Body):
     """Soil as particles on a background mesh.
 
     Args:
@@ -123,7 +124,7 @@ class Model(ContactMethods, Body):
         return self._core.steps
 
     def critical_time_step(self) -> float:
-        """Critical time step (16): smallest h_min / c_d over the particles [s]; `critical_cell` finds the cell that sets it."""
+        """Critical time step (16): smallest h_min / c_d over the particles [s], less with structural members; see `critical_cell`."""
         return self._core.critical_time_step()
 
     def out_of_balance(
@@ -325,6 +326,7 @@ class Model(ContactMethods, Body):
         """
         refuse_driven_bodies(self, "the implicit scheme", second_order=second_order)
         refuse_drag(self, "the implicit scheme")
+        refuse_members(self, "the implicit scheme")
         if small_displacements:
             refuse_contacts(self, "the implicit scheme with small_displacements")
         if isinstance(solver, Relaxation):

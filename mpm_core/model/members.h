@@ -1,0 +1,42 @@
+#pragma once
+/// @file
+/// Structural members in explicit steps: bars, struts and beams without mass, elastic and perfectly plastic, whose
+/// nodes move with the soil (Hamad et al. 2015, Geotextiles and Geomembranes 43, 406-416, for membranes; rotations of
+/// any size). A node takes the velocity of the nodes of its cell, and gives them its force, by the shape functions
+/// times the density of the soil at these nodes: nodes that hardly have any mass neither move it nor are moved by it.
+
+#include "model/model.h"
+
+namespace mpm::model
+{
+/// A member with these nodes and these forces in it, undeformed otherwise.
+/// @param axial_force  of its segments
+/// @param moments  at its inner nodes; empty without bending
+template <int D>
+Member<D> make_member(std::string name, const MemberProperties& properties, std::vector<Vector<D>> positions,
+                      std::vector<double> axial_force, std::vector<double> moments);
+
+/// Finds what members need of the mesh, after anything but a step has changed it: their cells, and the volumes of the
+/// cells around the nodes.
+/// @throws RunError on all ranks, for a node outside of the mesh
+/// @note Collective where there are members
+template <class G>
+void begin_members(Model<G>& model);
+
+/// Updates the forces in the members and adds them to the tractions at the nodes of a field.
+/// @pre sums of the field's nodes are there
+/// @note Collective where there are members
+template <class G>
+void add_member_forces(Model<G>& model, VelocityField<G>& field);
+
+/// Moves the nodes of the members with the soil.
+/// @throws RunError as begin_members
+/// @note Collective where there are members
+template <class G>
+void move_members(Model<G>& model, double dt);
+
+/// Bound of the square of the highest frequency of the members with the mass of the soil around them [1/s2].
+/// @note Collective where there are members
+template <class G>
+double squared_frequency_of_members(Model<G>& model);
+} // namespace mpm::model

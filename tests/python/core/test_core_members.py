@@ -1,0 +1,234 @@
+"""Structural members that move with particles: against springs, pendulums, plastic ties and the finite elements' equilibrium."""
+
+import math
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from mpm_core.member_methods import take_members
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+COMM = MPI.COMM_WORLD
+LEFT, RIGHT, BOTTOM, TOP = 1, 2, 3, 4
+BLOCK = (1.0, 0.5, 1.5, 1.0)
+"""Lower left and upper right corner of a block, 0.5 m wide"""
+
+
+def block_model(gravity=(0.0, 0.0), boxes=(BLOCK,), counts=(24, 24), lengths=(3.0, 3.0), density=2000.0):
+    """Stiff blocks without supports in an empty mesh."""
+    domain, cell_tags, facet_tags = bridge.box_mesh(COMM, lengths, counts)
+    model = mpm.Model(bridge.background_mesh(domain, cell_tags, facet_tags), mpm.LinearElastic(young=50e6, poisson=0.2))
+    size = 0.5 * lengths[0] / counts[0]  # two by two particles in a square
+    for x0, y0, x1, y1 in boxes:
+        x, y = (np.arange(low + size / 2, high, size) for low, high in ((x0, x1), (y0, y1)))
+        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        model.seed_points(points, np.full(len(points), size**2), density=density)
+    model.set_gravity(gravity)
+    return model
+
+
+def mean(model, name):
+    p = model.particles
+    return np.average(getattr(p, name), axis=0, weights=p.mass)
+
+
+def test_a_block_on_a_strut_swings_as_a_mass_on_a_spring():
+    model, stiffness, length, speed = block_model(), 2e6, 1.0, 0.5
+    model.install({"strut": mpm.strut((1.25, 0.75), (1.25, 0.75 + length), stiffness * length, fixed_end=True)})
+    model.particles.set("velocity", np.tile((0.0, -speed), (len(model.particles), 1)))
+    frequency = math.sqrt(stiffness / (2000 * 0.25))
+    quarter = math.pi / 2 / frequency
+    list(model.explicit(until=quarter))
+    force = model.member_forces("strut").axial_force[0]
+    assert force == pytest.approx(speed * math.sqrt(stiffness * 500), rel=0.03)  # v sqrt(k m), at the turning point
+    assert abs(mean(model, "velocity")[1]) < 0.03 * speed
+    list(model.explicit(until=2 * quarter))
+    assert mean(model, "velocity")[1] == pytest.approx(speed, rel=0.03)
+
+
+def test_a_tie_that_yields_holds_a_falling_block_by_its_strength():
+    strength, gravity = 2e3, 10.0
+    model = block_model(gravity=(0.0, -gravity))
+    model.install({"tie": mpm.strut((1.25, 0.75), (1.25, 2.0), 50e6, tensile_strength=strength, fixed_end=True)})
+    list(model.explicit(until=0.1))
+    assert model.member_forces("tie").axial_force[0] == pytest.approx(strength, rel=1e-9)
+    acceleration = gravity - strength / 500.0
+    assert mean(model, "velocity")[1] == pytest.approx(-acceleration * 0.1, rel=0.02)
+
+
+def test_a_block_on_a_cable_swings_as_a_pendulum_by_a_large_angle():
+    length, gravity, time = 1.5, 9.81, 0.4
+    pivot = np.array([1.25 - length * math.sin(1.0), 0.75 + length * math.cos(1.0)])
+    model = block_model(gravity=(0.0, -gravity), lengths=(3.0, 3.0))
+    model.install({"cable": mpm.strut((1.25, 0.75), pivot, 20e6, compressive_strength=0.0, fixed_end=True)})
+    list(model.explicit(until=time))
+    angle, rate, steps = 1.0, 0.0, 4000
+    for _ in range(steps):  # semi-implicit Euler, to 1e-4
+        rate -= gravity / length * math.sin(angle) * time / steps
+        angle += rate * time / steps
+    expected = pivot + length * np.array([math.sin(angle), -math.cos(angle)])
+    moved = mean(model, "position")
+    assert np.linalg.norm(moved - expected) < 0.01 * np.linalg.norm(expected - (1.25, 0.75))
+    assert np.linalg.norm(moved - pivot) == pytest.approx(length, rel=2e-3)
+
+
+def test_members_between_bodies_conserve_momentum():
+    model = block_model(boxes=(BLOCK, (1.0, 1.75, 1.5, 2.25)))
+    model.install({"strut": mpm.strut((1.3, 0.9), (1.2, 1.9), 5e6)})
+    upper = model.particles.position[:, 1] > 1.5
+    model.particles.set("velocity", np.where(upper[:, None], (0.1, 0.5), (0.0, 0.0)))
+    before = mean(model, "velocity")
+    list(model.explicit(until=0.05))
+    assert abs(model.member_forces("strut").axial_force[0]) > 100.0
+    assert np.allclose(mean(model, "velocity"), before, atol=1e-12)
+
+
+def retained(degree=1):
+    """Elastic ground with a wall and a nail in equilibrium under its weight, by finite elements; and its mesh."""
+    mesh = bridge.box_mesh(COMM, (6.0, 3.0), (24, 12))
+    supports = [bridge.fixed(BOTTOM), bridge.roller(LEFT, (1, 0))]
+    soil = mpm.LinearElastic(young=10e6, poisson=0.2)
+    fem = bridge.QuasiStatic(mesh[0], soil, mesh[2], supports, degree=degree)
+    fem.reconfigure(
+        members={
+            "wall": mpm.beam([(3.1, 3.0), (3.1, 0.8)], 1e8, 2e5, plastic_moment=1e3),
+            "nail": mpm.bar([(3.1, 2.5), (5.2, 2.1)], 20e6, prestress=5e3),
+        }
+    )
+    fem.solve(bridge.Load(unit_weight=20e3))
+    model = mpm.Model(bridge.background_mesh(*mesh), soil)
+    model.seed(density=2000.0, per_cell=3)
+    bridge.apply_supports(model, supports)
+    model.set_gravity((0.0, -10.0))
+    return fem, model
+
+
+def test_particles_take_members_over_from_finite_elements_in_equilibrium():
+    fem, model = retained()
+    handover = bridge.initialise(model, fem, equilibrate=False)
+    assert handover.unbalanced_ratio < 1e-10
+    assert np.abs(fem.member_forces("wall").moment).max() > 50.0
+    list(model.explicit(until=0.1, nmd=False))
+    for name in ("wall", "nail"):
+        before, after = fem.member_forces(name), model.member_forces(name)
+        assert np.allclose(after.axial_force, before.axial_force, rtol=0, atol=1e-6 * np.abs(before.axial_force).max())
+        assert np.allclose(after.moment, before.moment, rtol=0, atol=1e-6 * max(1.0, np.abs(before.moment).max()))
+
+
+def test_stiff_members_shorten_the_steps_and_keep_them_stable():
+    fem, model = retained()
+    bridge.initialise(model, fem, equilibrate=False)
+    plain = model.critical_time_step()
+    model.install({"stiff": mpm.bar([(1.0, 2.9), (5.0, 0.3)], 50e9)})
+    assert model.critical_time_step() < 0.1 * plain
+    *_, last = model.explicit(until=0.01, nmd=False)
+    assert np.abs(model.particles.velocity).max() < 1e-6  # it is without strain, so that nothing moves
+    assert last.dt < model.critical_time_step()
+    with pytest.raises(mpm.InputError, match="dt is .*, above the critical time step"):
+        list(model.explicit(until=0.02, dt=plain))
+
+
+def test_a_part_in_the_air_carries_nothing_and_goes_along():
+    model = block_model(gravity=(0.0, -10.0))
+    model.install({"bar": mpm.bar([(1.25, 0.6), (1.25, 1.9)], 5e6, spacing=0.13)})  # the block ends at 1 m
+    list(model.explicit(until=0.1))
+    forces = model.member_forces("bar")
+    in_air = forces.positions[:-1, 1] > 1.15
+    assert in_air.sum() > 3
+    assert np.all(forces.axial_force[in_air] == 0.0)
+    fall = mean(model, "displacement")
+    assert np.allclose(forces.displacement, fall, atol=0.01 * np.linalg.norm(fall))
+
+
+def test_a_plastic_moment_limits_the_moments_of_a_wall_that_particles_bend():
+    limit = 200.0
+    domain, cell_tags, facet_tags = bridge.box_mesh(COMM, (6.0, 3.0), (24, 12))
+    soil = mpm.LinearElastic(young=1e6, poisson=0.2)
+
+    def pushed(plastic_moment):
+        model = mpm.Model(bridge.background_mesh(domain, cell_tags, facet_tags), soil)
+        model.seed(density=2000.0, per_cell=3)
+        model.fix(BOTTOM)
+        model.roller(RIGHT, (1, 0))
+        model.install({"wall": mpm.beam([(3.1, 2.9), (3.1, 0.3)], 1e7, 1e5, plastic_moment)})
+        model.set_gravity((5.0, -10.0))
+        list(model.explicit(until=0.3, rayleigh=mpm.Rayleigh(mass=10.0, plastic_strain=np.inf)))
+        return model.member_forces("wall")
+
+    assert np.abs(pushed(math.inf).moment).max() > 1.5 * limit
+    assert np.abs(pushed(limit).moment).max() == pytest.approx(limit)
+
+
+def test_a_run_with_members_goes_on_from_a_checkpoint_to_the_last_bit(tmp_path):
+    def made():
+        return block_model(gravity=(0.0, -10.0), boxes=(BLOCK, (1.0, 1.75, 1.5, 2.25)))
+
+    members = {"tie": mpm.strut((1.25, 0.75), (1.25, 2.0), 5e6, tensile_strength=1e3),
+               "wall": mpm.beam([(1.1, 0.55), (1.1, 0.95)], 1e7, 1e4, spacing=0.1)}  # fmt: skip
+    whole, first = made(), made()
+    for model in (whole, first):
+        model.install(members)
+        list(model.explicit(until=0.04, every=0.02))
+    first.save(tmp_path / "half.h5")
+    again = made()
+    again.restore(tmp_path / "half.h5")
+    assert again.members == first.members == members
+    for model in (whole, again):
+        list(model.explicit(until=0.08))
+    assert np.array_equal(whole.particles.position[np.argsort(whole.particles.id)],
+                          again.particles.position[np.argsort(again.particles.id)])  # fmt: skip
+    for name in members:
+        one, other = whole.member_forces(name), again.member_forces(name)
+        assert np.array_equal(one.axial_force, other.axial_force) and np.array_equal(
+            one.displacement, other.displacement
+        )
+
+
+def test_a_damaged_member_in_a_checkpoint_is_an_error_and_changes_nothing(tmp_path):
+    model = block_model()
+    model.install({"bar": mpm.bar([(1.1, 0.6), (1.4, 0.9)], 5e6)})
+    model.save(tmp_path / "good.h5")
+    description = mpm.checkpoint_description(tmp_path / "good.h5")
+    assert description["members"][0]["name"] == "bar"
+    other = block_model()
+    other.install({"tie": mpm.bar([(1.1, 0.6), (1.4, 0.9)], 5e6)})
+    for damage in ({"axial_force": [1.0]}, {"cells": []}, {"moments": [1.0, 2.0]}):
+        entries = [{**description["members"][0], "state": {**description["members"][0]["state"], **damage}}]
+        with pytest.raises(mpm.InputError, match="lists whose lengths do not fit"):
+            take_members(other, entries)
+        take_members(other, description["members"])
+        assert list(other.members) == ["bar"]
+
+
+def test_what_does_not_support_members_says_so():
+    model = block_model()
+    bar = {"bar": mpm.bar([(1.1, 0.6), (1.4, 0.9)], 5e6)}
+    model.install(bar)
+    with pytest.raises(mpm.InputError, match="structural members .'bar'., which the implicit scheme does not support"):
+        list(model.implicit(until=0.1, dt=0.01))
+    with pytest.raises(mpm.InputError, match="equilibrate.. does not support structural members"):
+        model.equilibrate()
+    with pytest.raises(mpm.InputError, match="transfer is AFFINE with structural members"):
+        list(model.explicit(until=0.1, transfer=mpm.Transfer.AFFINE))
+    with pytest.raises(mpm.InputError, match="'bar' is installed already"):
+        model.install(bar)
+    with pytest.raises(mpm.InputError, match="'nail' has 3 dimensions, expected 2"):
+        model.install({"nail": mpm.bar([(0, 0, 0), (1, 0, 0)], 5e6)})
+    with pytest.raises(mpm.InputError, match=r"structural member 'far' at \(1.25, 3.125\) m is outside"):
+        model.install({"far": mpm.bar([(1.25, 0.75), (1.25, 4.0)], 5e6)})
+    with pytest.raises(mpm.InputError, match="forces has 'other', expected names of members"):
+        model.install({"new": mpm.bar([(1.1, 0.6), (1.4, 0.9)], 5e6)}, {"other": model.member_forces("bar")})
+    with pytest.raises(mpm.InputError, match=r"name is 'tie', expected one of \['bar'\]"):
+        model.member_forces("tie")
+    assert list(model.members) == ["bar"]
+
+
+def test_a_hand_over_with_members_asks_for_no_equilibration():
+    fem, model = retained()
+    with pytest.raises(mpm.InputError, match="equilibrate is True, expected False with structural members"):
+        bridge.initialise(model, fem)
+    model.install({"nail": mpm.bar([(3.1, 2.5), (5.2, 2.1)], 20e6)})
+    with pytest.raises(mpm.InputError, match="model has the member 'nail', expected it in fem only"):
+        bridge.initialise(model, fem, equilibrate=False)
