@@ -57,12 +57,23 @@ def parser() -> ArgumentParser:
 # --- 2. The same stages by particles ---------------------------------------------------------------------------------
 
 
-def build(site: Site, per_cell: int, factor: float, nmd: bool) -> tuple[bridge.ParticleSite, str | None]:
-    """Particles after all stages, and why they ended early if they did; weaker laws are there for the slide. Collective."""
+def build(
+    site: Site, per_cell: int, factor: float, nmd: bool, staged: bridge.FemSite | None = None
+) -> tuple[bridge.ParticleSite, str | None]:
+    """Particles after all stages, and why they ended early if they did; weaker laws are there for the slide. Collective.
+
+    Where stages install structural members the particles begin from the finite elements, `staged`: quasi-static ones have none.
+    """
     model, materials = site.model(site.weaker_laws(factor) if factor > 1 else ())
     particles = bridge.ParticleSite(
         model, materials, site.supports, per_cell=per_cell, small_displacements=True, nmd=nmd
     )
+    if site.members and staged is not None:
+        handover = particles.take_over(staged)
+        say(
+            f"the particles begin from the finite elements, which have the structural members; out-of-balance ratio {handover.unbalanced_ratio:.1e}"
+        )
+        return particles, None
     try:
         for report in bridge.carry_out(particles, site.stages):
             if comm.rank == 0:
@@ -118,14 +129,16 @@ def main(arguments: list[str] | None = None) -> int:
     site = read_site(a.site, comm, a.cell_size, needed=("stages",))
     folder = open_results(a, comm)
     degree, averaged = int(a.elements[1]), site_slides.averages(a, site.laws.values())
-    run = carry_out(site, degree, folder, comm, nmd=averaged and degree == 1)
+    nmd = averaged and degree == 1
+    run = carry_out(site, degree, folder, comm, nmd=nmd, as_particles=nmd and bool(site.members))
     failed, rows = run.stopped, run.rows
     built = perf_counter()
-    particles, failed_particles = build(site, a.particles_per_cell, a.factor, averaged)
-    apart = stress_difference(particles, run.site) if not (failed or failed_particles) else None
+    particles, failed_particles = build(site, a.particles_per_cell, a.factor, averaged, run.site)
+    own_stages = not (failed or failed_particles or site.members)
+    apart = stress_difference(particles, run.site) if own_stages else None
     model = particles.model
     model.particles.set("initial_position", model.particles.position)
-    factor = 1.0 if failed_particles else a.factor
+    factor = 1.0 if failed_particles or (failed and site.members) else a.factor
     weaken(site, model, factor)
     scene = scene_of(model, sorted(site.laws))
     with Interrupt(comm) as interrupt:

@@ -248,6 +248,13 @@ class SiteState:
             new.pore_pressure = stage.pore_pressure
         return new, fill, excavate
 
+    def at(self, other: SiteState) -> SiteState:
+        """The state of another site with the same tags, on the mesh of this one."""
+        new = object.__new__(SiteState)
+        own = ("_comm", "_cells_of", "_facets_of", "_name_of")
+        new.__dict__.update({**other.__dict__, **{name: getattr(self, name) for name in own}})
+        return new
+
     def _supports_after(self, stage: Stage, where: str) -> Any:
         held = {n for support in self.supports for n in self._facets_of(support.facet_tag, where + "support")}
         gone = {n for tag in stage.release for n in self._facets_of(tag, where + "release")}

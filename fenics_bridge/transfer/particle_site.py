@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 import mpm_core as mpm
 from fenics_bridge.errors import InputError, agree, real_numbers
+from fenics_bridge.fem.fem_site import FemSite
 from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport
 from fenics_bridge.fem.supports import Support, not_supports
+from fenics_bridge.transfer.handover import Handover, initialise
 from fenics_bridge.transfer.particle_forces import boundary_forces, seepage_forces
 
 
@@ -121,8 +123,50 @@ class ParticleSite:
             self.number, stage.name, report.cuts + 1, report.iterations, max(model.comm.allgather(float(moved)))
         )
 
+    def take_over(self, site: FemSite) -> Handover:
+        """Begin from finite elements after their stages, with their structural members, in the place of own stages. Collective.
+
+        Particles get loads, water, stress and state of the finite elements, and no displacement. They are not brought to
+        equilibrium: what is out of balance is round-off with linear elements on the same cells that average as particles do, and
+        after a stage that failed the part of its change that had no equilibrium.
+
+        Args:
+            site: finite elements on the same mesh, or on a part of it with the same tags.
+
+        Returns:
+            What `initialise` reports.
+
+        Raises:
+            InputError: particles have had a stage, a soil has no law, or as `initialise`. Raised on all ranks alike.
+        """
+        model, state = self.model, site.state
+        agree(
+            model.comm,
+            f"stage {self.number} has been carried out, expected none before take_over" if self.number else None,
+        )
+        stage = Stage("take over")
+        laws = {tag: self._number_of(law, stage) for tag, law in state.law.items()}
+        self._material = {**self._material, **laws}
+        without = next((tag for tag in state.there if tag not in self._material), None)
+        name = "" if without is None else self.state._name_of(without)
+        agree(model.comm, f"materials has no law for the soil {name}, expected one" if name else None)
+        for tag in state.there:
+            self._fill(tag, state.unit_weight[tag], stage)
+        apply_supports(model, state.supports)
+        self._load(state)
+        self.state, self.number = self.state.at(state), site.number
+        nmd, reached = self._options.get("nmd"), site.fem.converged
+        site.fem.converged = True  # after a stage that failed, too, they are in equilibrium with what acts of it
+        try:
+            return initialise(model, site.fem, count_displacement=False, equilibrate=False, nmd=nmd)
+        finally:
+            site.fem.converged = reached
+
     def _refuse_members(self, stage: Stage) -> None:
-        problem = f"stage {stage.name!r}: install is {list(stage.install)}, expected none: quasi-static particles have no members"
+        problem = (
+            f"stage {stage.name!r}: install is {list(stage.install)}, expected none: quasi-static particles have no members; take_over "
+            "has those of finite elements"
+        )
         agree(self.model.comm, problem if stage.install else None)
 
     def rows_of(self, soil: int | str) -> NDArray[np.bool_]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,15 +44,27 @@ def stage_forces(site: bridge.FemSite, name: str) -> StageForces:
     return StageForces(site.number, name, {each: site.fem.member_forces(each) for each in site.fem.members})
 
 
-def force_row(stage: StageForces) -> dict[str, float]:
-    """Extreme forces of each member after a stage, for a table; columns are named by the members."""
-    row: dict[str, float] = {}
-    for name, forces in stage.forces.items():
-        key = name.replace(" ", "_")
-        row[f"{key}_axial_force_N_per_m"] = largest(forces.axial_force)
-        if np.any(forces.moment):
-            row[f"{key}_moment_N_m_per_m"] = largest(forces.moment)
-    return row
+def axial_column(member: str) -> str:
+    """Name of the column of a member's axial force."""
+    return f"{member.replace(' ', '_')}_axial_force_N_per_m"
+
+
+def moment_column(member: str) -> str:
+    """Name of the column of a beam's moment."""
+    return f"{member.replace(' ', '_')}_moment_N_m_per_m"
+
+
+def force_columns(members: Mapping[str, mpm.Member]) -> list[str]:
+    """Names of the columns of `force_row`."""
+    bending = [moment_column(name) for name, member in members.items() if member.bending_stiffness]
+    return [*map(axial_column, members), *bending]
+
+
+def force_row(members: Mapping[str, mpm.Member], forces: Mapping[str, mpm.MemberForces]) -> dict[str, float]:
+    """Axial force of each member, and moment of each beam, where they are largest, for a table."""
+    axial = {axial_column(name): largest(one.axial_force) for name, one in forces.items()}
+    bending = [name for name in forces if members[name].bending_stiffness]
+    return axial | {moment_column(name): largest(forces[name].moment) for name in bending}
 
 
 def largest(values: np.ndarray) -> float:
@@ -83,7 +96,7 @@ def write_members(folder: Path, stages: list[StageForces], comm: MPI.Comm) -> No
 def member_pictures(stages: list[StageForces], folder: Path) -> Pictures:
     """A picture of each beam, and one of the axial forces of bars and struts over the stages."""
     names = list(dict.fromkeys(name for stage in stages for name in stage.forces))
-    bending = [name for name in names if any(np.any(s.forces[name].moment) for s in stages if name in s.forces)]
+    bending = [name for name in names if any(s.forces[name].bends for s in stages if name in s.forces)]
     pictures: dict[str, Any] = {}
     for name in bending:
         path = folder / f"{file_name(name)}.png"

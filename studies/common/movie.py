@@ -88,9 +88,14 @@ def averaged_where_known(model: mpm.Model, values: np.ndarray) -> np.ndarray:
 
 
 def _bodies(model: mpm.Model) -> dict[str, np.ndarray]:
-    """The rigid surfaces that the particles touch, as segments, where there are any. Collective."""
+    """Rigid surfaces and structural members as segments, where there are any. Collective."""
     outlines = [contact.outline() for contact in model.contacts]
-    return {"bodies": np.concatenate([points[cells] for points, cells in outlines])} if outlines else {}
+    segments = [points[cells] for points, cells in outlines]
+    for name in model.members:
+        forces = model.member_forces(name)
+        nodes = forces.positions + forces.displacement
+        segments.append(np.stack([nodes[:-1], nodes[1:]], axis=1))
+    return {"bodies": np.concatenate(segments)} if segments else {}
 
 
 def particle_frame(model: mpm.Model, time: float) -> dict[str, np.ndarray] | None:

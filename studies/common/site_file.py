@@ -83,11 +83,12 @@ class Site:
     def finite_elements(self, degree: int, laws: dict[int, Any] | None = None, **options: Any) -> bridge.QuasiStatic:
         """Elements of all soils, with a law for each tag; options: further ones of `QuasiStatic`. Collective.
 
-        Linear elements average volumetric strains where a soil of the site keeps its volume, unless `nmd` says otherwise.
+        Linear elements average volumetric strains where a soil of the site keeps its volume, unless `nmd` says otherwise. Without
+        stages all structural members are there.
         """
         options.setdefault("nmd", degree == 1 and keeps_volume([*self.laws.values(), *self.further_laws]))
         body, cell_tags, facet_tags = self.body()
-        return bridge.QuasiStatic(
+        fem = bridge.QuasiStatic(
             body,
             laws or self.laws,
             facet_tags,
@@ -97,6 +98,9 @@ class Site:
             geometry=self.geometry,
             **options,
         )
+        if self.members and not self.stages:
+            fem.reconfigure(members=self.members)
+        return fem
 
     def body(self) -> tuple[Any, Any, Any]:
         """Domain, cell tags and facet tags of the soils alone. Collective."""
@@ -223,6 +227,11 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
     site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, supports_of(table, path, domain, facet_tags), [],
                 list(others.values()), axisymmetric, rows, members)  # fmt: skip
     site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(rows)]
+    absent = [name for name in members if rows and not any(name in stage.install for stage in site.stages)]
+    if absent:
+        say(
+            f"{path}: no stage installs {', '.join(map(repr, absent))}, which therefore is not there; name it in install of a stage"
+        )
     placed = {soil for stage in site.stages for soil in stage.fill}
     left = {soil: weight for soil, weight in weights.items() if soil not in placed}
     if rows and left and "day" in rows[0]:  # what these stages do not place is there before them

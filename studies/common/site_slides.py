@@ -24,6 +24,7 @@ from .figures import Pictures
 from .history import History
 from .interrupt import Interrupt
 from .lengths import metres
+from .member_results import axial_column, force_columns, force_row
 from .movie import particle_frame, particle_movie
 from .options import add_count, add_number, add_switch
 from .output_options import add_picture_options
@@ -43,6 +44,7 @@ CAPTIONS = {
     "slide_displacement": "Displacement at the end of the slide",
     "slide_strain": "Accumulated plastic shear strain at the end of the slide",
     "largest_displacement": "Largest displacement of a particle during the slide",
+    "member_forces": "Largest axial force of each structural member during the slide; tension is positive",
 }
 
 
@@ -82,9 +84,10 @@ class Slide:
     def look(self, report: mpm.Report) -> None:
         """Note how far the particles have moved, and keep a frame. Collective."""
         moved = np.linalg.norm(self.model.particles.displacement, axis=1).max(initial=0.0)
+        forces = {name: self.model.member_forces(name) for name in self.model.members}
         self.history.add(
             time_s=report.time, largest_displacement_m=comm.allreduce(float(moved), MPI.MAX),
-            kinetic_energy_J_per_m=report.kinetic_energy, plastic_fraction=report.plastic_fraction,
+            kinetic_energy_J_per_m=report.kinetic_energy, plastic_fraction=report.plastic_fraction, **force_row(self.model.members, forces),
         )  # fmt: skip
         self.files.write()
         frame = particle_frame(self.model, report.time)
@@ -112,7 +115,7 @@ def slide(
     options = {"every": a.time / a.frames, "damping": a.damping, "pic": a.pic, "nmd": nmd}
     scheme = model.explicit if step is None else partial(model.implicit, dt=step)
     with (
-        History(folder / "history.csv", COLUMNS, comm) as history,
+        History(folder / "history.csv", [*COLUMNS, *force_columns(model.members)], comm) as history,
         ModelOutput(model, folder / "particles", folder / "mesh") as files,
         Progress("slide", a.time, comm) as progress,
     ):
@@ -143,7 +146,7 @@ def slide_pictures(a: Namespace, result: Slide, scene: Scene | None, folder: Pat
 
     def particles(name: str, key: str, quantity: Quantity) -> None:
         save_particles(folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
-                       title=f"$t$ = {last['time']:.1f} s")  # fmt: skip
+                       title=f"$t$ = {last['time']:.1f} s", bodies=last.get("bodies"))  # fmt: skip
 
     pictures: dict[str, Callable] = {
         "slide_displacement": lambda: particles("slide_displacement", "displacement", DISPLACEMENT),
@@ -152,6 +155,10 @@ def slide_pictures(a: Namespace, result: Slide, scene: Scene | None, folder: Pat
             folder / "largest_displacement.png", history["time_s"], {"largest": largest}, "Largest displacement [m]",
             limits=(0, max(0.1, 1.05 * largest.max()))),
     }  # fmt: skip
+    if axial := {name: 1e-3 * history[axial_column(name)] for name in result.model.members}:
+        pictures["member_forces"] = lambda: save_history(
+            folder / "member_forces.png", history["time_s"], axial, "Axial force [kN/m]"
+        )
     if a.film:
         pictures["film"] = lambda: save_animation(folder / "slide", scene, result.frames, "shear_strain", SHEAR_STRAIN)
     return pictures
@@ -179,7 +186,7 @@ def site_slide(a: Namespace) -> int:
         carried = max((step.value for step in steps if step.converged), default=0.0)
         raise mpm.InputError(f"{a.site}: its soils carry {carried:.1%} of their weight only: {reason}")
     model = site.particles(a.particles_per_cell, more=site.weaker_laws(a.factor))
-    handover = bridge.initialise(model, fem, count_displacement=False, nmd=nmd)
+    handover = bridge.initialise(model, fem, count_displacement=False, nmd=nmd, equilibrate=not fem.members)
     model.assign(model.particles.material + len(site.laws))
     with Interrupt(comm) as interrupt:
         result, stopped = slide(a, model, folder, interrupt)

@@ -70,7 +70,7 @@ def carry_out(site: Site, degree: int, folder: Path, comm: MPI.Comm, **options: 
             files.write(report.number)
             run.forces.append(stage_forces(run.site, report.name))
             run.rows.append({**movements(run.site), "stage": report.name, "steps": report.steps, "iterations": report.iterations,
-                             "largest_displacement_m": report.largest_displacement, **force_row(run.forces[-1])})  # fmt: skip
+                             "largest_displacement_m": report.largest_displacement, **force_row(run.site.fem.members, run.forces[-1].forces)})  # fmt: skip
             picture = stage_picture(run.site, report.name)
             if picture is not None:
                 run.pictures.append(picture)

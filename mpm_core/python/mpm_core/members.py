@@ -248,15 +248,18 @@ class MemberForces:
     """Bending moment at the nodes [N m/m], 0 at the ends, shape (n,); positive where its left side, seen along its line, is compressed"""
 
     @property
+    def bends(self) -> bool:
+        """Whether there are any moments."""
+        return bool(np.any(self.moment))
+
+    @property
     def shear_force(self) -> NDArray[np.float64]:
         """Shear force of each segment, the change of the moment along it [N/m], shape (n - 1,)."""
         return np.diff(self.moment) / np.linalg.norm(np.diff(self.positions, axis=0), axis=1)
 
     def __repr__(self) -> str:
         axial = f"axial force from {self.axial_force.min():.4g} to {self.axial_force.max():.4g} N/m"
-        moment = (
-            f", moment from {self.moment.min():.4g} to {self.moment.max():.4g} N m/m" if np.any(self.moment) else ""
-        )
+        moment = f", moment from {self.moment.min():.4g} to {self.moment.max():.4g} N m/m" if self.bends else ""
         return f"<MemberForces: {len(self.positions)} nodes, {axial}{moment}>"
 
 

@@ -92,3 +92,68 @@ def test_a_braced_pit_has_a_factor_of_safety_and_fails_without_its_members(tmp_p
     options = f"--site {without} --cell-size 3 --meshes 1 --start 0.8 --output {tmp_path / 'without'}"
     with pytest.raises(mpm.InputError, match=r"only \d.*% of the load is carried"):
         safety.main(options.split())
+
+
+NAILED = (ROOT / "meshes" / "nailed_slope.toml").read_text()
+
+
+def nailed_in(folder, text=NAILED):
+    (folder / "nailed_slope.geo").write_text((ROOT / "meshes" / "nailed_slope.geo").read_text())
+    (folder / "nailed.toml").write_text(text)
+    return folder / "nailed.toml"
+
+
+def history_of(folder):
+    with open(folder / "history.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_nails_of_a_site_without_stages_hold_its_slope_and_move_with_it(tmp_path):
+    """The cut fails without nails; with them particles begin in equilibrium, and nails carry more as the soil weakens."""
+    slope = importlib.import_module("slope")
+    run = "--cell-size 1.5 --factor 1.7 --time 0.3 --frames 3 --no-pictures --no-film"
+    assert slope.main(f"--site {nailed_in(tmp_path)} {run} --output {tmp_path / 'nailed'}".split()) == 0
+    summary = json.loads((tmp_path / "nailed" / "summary.json").read_text())
+    assert (
+        summary["initial_out_of_balance_ratio"] < 0.01
+    )  # the facing is at the surface, where nodes have unlike masses
+    rows = history_of(tmp_path / "nailed")
+    first, last = (float(rows[k]["nail_5_axial_force_N_per_m"]) for k in (0, -1))
+    assert 0 < first < last <= 163e3
+    assert abs(float(rows[-1]["facing_moment_N_m_per_m"])) <= 15e3 * (1 + 1e-9)
+    without = nailed_in(tmp_path, NAILED[: NAILED.index("[members.facing]")])
+    with pytest.raises(mpm.InputError, match=r"only \d.*% of the load is carried"):
+        importlib.import_module("safety").main(
+            f"--site {without} --cell-size 1.5 --meshes 1 --start 0.9 --output {tmp_path / 'without'}".split()
+        )
+
+
+def test_a_member_that_no_stage_installs_is_named(tmp_path):
+    text = SITE.replace('install = ["lower strut"]\n', "")
+    with pytest.warns(RuntimeWarning, match="no stage installs 'lower strut', which therefore is not there"):
+        site_file.read_site(site_in(tmp_path, text), MPI.COMM_WORLD, 4.0)
+
+
+@pytest.mark.parametrize("strength", ["12e3", "3e3"])
+def test_particles_of_an_embankment_take_its_geotextile_over(tmp_path, strength):
+    """Also where the clay is so soft that a stage fails: its slide begins from there."""
+    text = (ROOT / "meshes" / "embankment.toml").read_text()
+    text = text.replace("shear_strength = {value = 12e3", f"shear_strength = {{value = {strength}")
+    geotextile = '[members.geotextile]\nkind = "bar"\npoints = [[0, 3], [11, 3]]\naxial_stiffness = 2e6\ncompressive_strength = 0\n\n'
+    text = text.replace('[[stages]]\nname = "1 m"\n', geotextile + '[[stages]]\nname = "1 m"\ninstall = "geotextile"\n')
+    (tmp_path / "embankment.geo").write_text((ROOT / "meshes" / "embankment.geo").read_text())
+    (tmp_path / "site.toml").write_text(text)
+    embankment = importlib.import_module("embankment")
+    options = f"--site {tmp_path / 'site.toml'} --cell-size 1 --time 0.2 --frames 2 --no-pictures --no-film"
+    assert embankment.main([*options.split(), "--output", str(tmp_path / "out")]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert (summary["stage_without_equilibrium_fem"] is None) == (strength == "12e3")
+    assert summary["factor"] == (1.5 if strength == "12e3" else 1.0)
+    with open(tmp_path / "out" / "members.csv", newline="") as file:
+        last = list(csv.DictReader(file))[-1]["stage"]
+        file.seek(0)
+        staged = [float(row["axial_force_N_per_m"]) for row in csv.DictReader(file) if row["stage"] == last]
+    started = float(history_of(tmp_path / "out")[0]["geotextile_axial_force_N_per_m"])
+    if strength == "12e3":
+        assert started == pytest.approx(max(staged), rel=0.05)  # the table has means of segments at the nodes
+    assert started > 1e3
