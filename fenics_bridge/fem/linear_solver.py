@@ -109,7 +109,8 @@ class LinearSolver:
         failure, added = "", 0.0
         for part in [p for p in (0.0, *PARTS) if p >= self._part]:
             if self._first is not None and part > added:
-                matrix.axpy(part - added, self._first, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+                # Members that slip along the soil have other entries than those that stick to it.
+                matrix.axpy(part - added, self._first, PETSc.Mat.Structure.UNKNOWN_NONZERO_PATTERN)
                 added = part
             solution.set(0.0)
             failure = self._solved(matrix, right, solution, options)

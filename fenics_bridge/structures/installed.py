@@ -13,7 +13,9 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from fenics_bridge import compat
+from fenics_bridge.structures.bond import bond_strengths, slip_tangent
 from fenics_bridge.structures.embedding import Embedding, cell_size_along
+from mpm_core import _core
 
 
 @dataclass
@@ -42,11 +44,21 @@ class _Installed:
         axial = 0.0 if self.stressing else self.member.axial_stiffness
         return np.where(self._is_axial(), axial, self.member.bending_stiffness)
 
-    def limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Least and largest force of each strain: (k,) each."""
-        axial, member = self._is_axial(), self.member
+    def respond(self, strain: NDArray[np.float64]) -> tuple[NDArray[np.float64], Any]:
+        """Forces after a strain increment (k,), within the strength of member and bond, and their derivatives (k, k)."""
+        axial, member, stiffness = self._is_axial(), self.member, self.stiffness()
+        elastic = self.force + stiffness * strain
         least = np.where(axial, -member.compressive_strength, -member.plastic_moment)
-        return least, np.where(axial, member.tensile_strength, member.plastic_moment)
+        largest = np.where(axial, member.tensile_strength, member.plastic_moment)
+        force = np.clip(elastic, least, largest)
+        tangent = sparse.diags(np.where(force == elastic, stiffness, 0.0))
+        if np.isinf(member.bond_strength) or self.stressing:
+            return force, tangent
+        n = self.segments
+        bond = bond_strengths(member, self.lengths[:n])
+        force[:n] = _core.forces_with_slip(elastic[:n], stiffness[:n] / self.lengths[:n], least[:n], largest[:n], bond)
+        slipping = slip_tangent(force[:n], (least[:n], largest[:n]), bond, self.lengths[:n])
+        return force, sparse.block_diag([stiffness[:n, None] * slipping, tangent.tocsr()[n:, n:]])
 
     def _is_axial(self) -> NDArray[np.bool_]:
         return np.arange(len(self.lengths)) < self.segments
@@ -70,7 +82,7 @@ class Members:
         self._first = index_map.local_range[0] * block
         self._there: dict[str, _Installed] = {}
         self._trial: NDArray[np.float64] = np.zeros(0)
-        self._tangent: NDArray[np.float64] = np.zeros(0)
+        self._tangent: Any = None  # derivatives of the forces by the strains
         self._strains: Any = None
 
     def __bool__(self) -> bool:
@@ -120,11 +132,13 @@ class Members:
             as_elastic: as the elastic stiffness predicts them, also where they exceed the strength: for the first residual of a step.
         """
         strain = self._strain(increment)
-        stiffness, least, largest, now = self._properties()
-        elastic = now + stiffness * strain
-        self._trial = elastic if as_elastic else np.clip(elastic, least, largest)
-        is_elastic = as_elastic | ((elastic >= least) & (elastic <= largest))
-        self._tangent = np.where(is_elastic, stiffness, 0.0)
+        if as_elastic:
+            self.back()
+            self._trial = self._trial + self._tangent @ strain
+            return
+        responses = [one.respond(part) for one, part in self._by_member(strain)]
+        self._trial = np.concatenate([force for force, _ in responses])
+        self._tangent = sparse.block_diag([tangent for _, tangent in responses]).tocsr()
 
     def accept(self) -> None:
         """Accept the forces of the last `follow` as those that the next step starts from."""
@@ -156,7 +170,7 @@ class Members:
         free[held] = 0.0
         free = np.concatenate(self._comm.allgather(free))
         of_all = self._strains @ sparse.diags(free)
-        own = (self._own(of_all).T @ sparse.diags(self._lengths() * self._tangent) @ of_all).tocsr()
+        own = (self._own(of_all).T @ sparse.diags(self._lengths()) @ self._tangent @ of_all).tocsr()
         own.sort_indices()
         size = (self._n_own, self._n)
         parts = own.indptr.astype(np.int32), own.indices.astype(np.int32), own.data
@@ -221,13 +235,6 @@ class Members:
     def _lengths(self) -> NDArray[np.float64]:
         return np.concatenate([one.lengths for one in self._there.values()])
 
-    def _properties(self) -> Any:
-        """Stiffness, least and largest force, and force of all strains."""
-        there = self._there.values()
-        least, largest = zip(*(one.limits() for one in there))
-        parts = [one.stiffness() for one in there], least, largest, [one.force for one in there]
-        return tuple(map(np.concatenate, parts))
-
     def reset_displacement(self) -> None:
         """Count displacements from now on, those of the body being zero."""
         for one in self._there.values():
@@ -235,8 +242,10 @@ class Members:
 
     def back(self) -> None:
         """Go back to the forces of the last step accepted, with elastic stiffness."""
-        if self:
-            self._tangent, _, _, self._trial = self._properties()
+        there = self._there.values()
+        if there:
+            self._trial = np.concatenate([one.force for one in there])
+            self._tangent = sparse.diags(np.concatenate([one.stiffness() for one in there]))
 
     def _by_member(self, values: NDArray[np.float64]) -> Iterator[tuple[_Installed, NDArray[np.float64]]]:
         start = 0

@@ -19,6 +19,9 @@ struct MemberProperties
   double tensile_strength;     ///< [N/m]
   double compressive_strength; ///< a positive number [N/m]
   double plastic_moment;       ///< [N m/m]
+  double bond_strength;        ///< largest force between it and the soil per length [N/m2]; infinite without slip
+  bool has_free_length;        ///< whether its first segment has no bond
+  bool connected;              ///< whether its first node does not slip in any case
   bool fixed_end;              ///< whether its last node is held in space
 };
 

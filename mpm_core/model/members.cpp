@@ -1,10 +1,12 @@
 #include "model/members.h"
 
 #include "mesh/search.h"
+#include "model/bond.h"
 #include "model/mapping.h"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <sstream>
 
 namespace mpm::model
@@ -54,24 +56,46 @@ bool carries(const Member<D>& member, std::size_t first, std::size_t last)
   return true;
 }
 
-/// Adds the internal force of a segment to those of its nodes.
+/// Largest force between a node and the soil: over half of the segments beside it.
 template <int D>
-void strain_segment(Member<D>& member, std::size_t k, std::vector<Vector<D>>& internal)
+double bond_strength_at(const Member<D>& member, std::size_t node)
+{
+  const std::size_t segments = member.initial_lengths.size();
+  const bool is_tied = (node == 0 && member.properties.connected) || (node == segments && member.properties.fixed_end);
+  if (is_tied)
+    return std::numeric_limits<double>::infinity();
+  const std::size_t first = member.properties.has_free_length ? 1 : 0;
+  const double before = node > first ? member.initial_lengths[node - 1] : 0;
+  const double after = node >= first && node < segments ? member.initial_lengths[node] : 0;
+  return member.properties.bond_strength * 0.5 * (before + after);
+}
+
+/// Updates the axial forces to the present lengths of the segments, within their strength and that of the bond.
+template <int D>
+void strain_segments(Member<D>& member, const std::vector<Segment<D>>& now)
 {
   const MemberProperties& of = member.properties;
-  const Segment<D> now = segment_of<D>(member, k);
-  const double stiffness = of.axial_stiffness / member.initial_lengths[k];
-  const double elastic = stiffness * (now.length - member.free_lengths[k]);
-  const double force =
-      carries(member, k, k + 1) ? std::clamp(elastic, -of.compressive_strength, of.tensile_strength) : 0;
-  if (force != elastic)
-    member.free_lengths[k] = now.length - force / stiffness;
-  member.axial_force[k] = force;
-  for (int a = 0; a < D; ++a)
+  BondedBar bar;
+  for (std::size_t k = 0; k < now.size(); ++k)
   {
-    internal[k][a] -= force * now.along[a];
-    internal[k + 1][a] += force * now.along[a];
+    const bool is_whole = carries<D>(member, k, k + 1);
+    bar.stiffness.push_back(of.axial_stiffness / member.initial_lengths[k]);
+    bar.force.push_back(bar.stiffness[k] * (now[k].length - member.free_lengths[k]));
+    bar.least.push_back(is_whole ? -of.compressive_strength : 0);
+    bar.largest.push_back(is_whole ? of.tensile_strength : 0);
   }
+  if (std::isfinite(of.bond_strength))
+  {
+    for (std::size_t n = 0; n <= now.size(); ++n)
+      bar.bond_strength.push_back(bond_strength_at<D>(member, n));
+    member.axial_force = forces_with_slip(bar);
+  }
+  else
+    for (std::size_t k = 0; k < now.size(); ++k)
+      member.axial_force[k] = std::clamp(bar.force[k], bar.least[k], bar.largest[k]);
+  for (std::size_t k = 0; k < now.size(); ++k)
+    if (member.axial_force[k] != bar.force[k])
+      member.free_lengths[k] = now[k].length - member.axial_force[k] / bar.stiffness[k];
 }
 
 /// Adds the internal forces of the moment at inner node k + 1: M times the derivatives of the angle there.
@@ -105,8 +129,16 @@ template <int D>
 std::vector<Vector<D>> internal_forces(Member<D>& member)
 {
   std::vector<Vector<D>> internal(member.positions.size());
+  std::vector<Segment<D>> now;
   for (std::size_t k = 0; k + 1 < member.positions.size(); ++k)
-    strain_segment<D>(member, k, internal);
+    now.push_back(segment_of<D>(member, k));
+  strain_segments<D>(member, now);
+  for (std::size_t k = 0; k < now.size(); ++k)
+    for (int a = 0; a < D; ++a)
+    {
+      internal[k][a] -= member.axial_force[k] * now[k].along[a];
+      internal[k + 1][a] += member.axial_force[k] * now[k].along[a];
+    }
   if constexpr (D == 2)
     for (std::size_t k = 0; k < member.moments.size(); ++k)
       bend_node(member, k, internal);

@@ -1,6 +1,9 @@
 #include "python/bindings.h"
 
+#include "model/bond.h"
 #include "model/members.h"
+
+#include <pybind11/numpy.h>
 
 namespace mpm::python
 {
@@ -9,9 +12,9 @@ namespace
 namespace py = pybind11;
 
 /// As `_properties` of mpm_core/member_methods.py orders them.
-MemberProperties properties_of(const std::array<double, 6>& given)
+MemberProperties properties_of(const std::array<double, 9>& given)
 {
-  return {given[0], given[1], given[2], given[3], given[4], given[5] != 0};
+  return {given[0], given[1], given[2], given[3], given[4], given[5], given[6] != 0, given[7] != 0, given[8] != 0};
 }
 
 template <int D>
@@ -59,7 +62,7 @@ template <class G, int D = G::dim>
 void bind_members_of(py::module_& m)
 {
   m.def("install_member",
-        [](Model<G>& model, const std::string& name, const std::array<double, 6>& properties,
+        [](Model<G>& model, const std::string& name, const std::array<double, 9>& properties,
            const std::vector<Vector<D>>& positions, const std::vector<double>& axial_force,
            const std::vector<double>& moments)
         {
@@ -75,7 +78,7 @@ void bind_members_of(py::module_& m)
           }
         });
   m.def("restore_member",
-        [](Model<G>& model, const std::string& name, const std::array<double, 6>& properties, const py::dict& state)
+        [](Model<G>& model, const std::string& name, const std::array<double, 9>& properties, const py::dict& state)
         { model.members.push_back(member_of<D>(name, properties_of(properties), state)); });
   m.def("member_state", [](const Model<G>& model, std::size_t number) { return state_of(model.members.at(number)); });
   m.def("clear_members", [](Model<G>& model) { model.members.clear(); });
@@ -84,6 +87,13 @@ void bind_members_of(py::module_& m)
 
 void bind_members(py::module_& m)
 {
+  m.def("forces_with_slip",
+        [](const std::vector<double>& force, const std::vector<double>& stiffness, const std::vector<double>& least,
+           const std::vector<double>& largest, const std::vector<double>& bond_strength)
+        {
+          const std::vector<double> found = forces_with_slip({force, stiffness, least, largest, bond_strength});
+          return py::array_t<double>(static_cast<py::ssize_t>(found.size()), found.data());
+        });
   bind_members_of<PlaneStrain>(m);
   bind_members_of<Axisymmetric>(m);
   bind_members_of<Solid>(m);

@@ -18,7 +18,7 @@ from .members import Member, MemberForces, of_members
 if TYPE_CHECKING:
     from .model import Model
 
-STRENGTHS = ("tensile_strength", "compressive_strength", "plastic_moment")
+STRENGTHS = ("tensile_strength", "compressive_strength", "plastic_moment", "bond_strength")
 """Entries of a member that may be infinite, which JSON does not have"""
 
 SAMPLES = 100
@@ -135,7 +135,7 @@ def _size_along(model: Model, line: NDArray[np.float64]) -> float:
 def _properties(member: Member) -> tuple[float, ...]:
     return (
         member.axial_stiffness, member.bending_stiffness, member.tensile_strength, member.compressive_strength,
-        member.plastic_moment, float(member.fixed_end),
+        member.plastic_moment, member.bond_strength, float(member.free_length > 0), float(member.connected), float(member.fixed_end),
     )  # fmt: skip
 
 

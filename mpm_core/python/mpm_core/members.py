@@ -39,6 +39,12 @@ class Member:
     """Largest bending moment [N m/m]"""
     prestress: float = 0.0
     """Axial force with which the member is installed [N/m], tension positive"""
+    bond_strength: float = math.inf
+    """Largest force between the member and the soil along it, per length [N/m2]; infinite without slip"""
+    free_length: float = 0.0
+    """Length from its first point on without any bond [m]: that of an anchor before its grouted body"""
+    connected: bool = False
+    """Whether its first point does not slip, being connected to a plate, a wall or another member there"""
     bonded: bool = True
     """Whether the member moves with the soil along its whole length, or only its two ends do"""
     fixed_end: bool = False
@@ -66,6 +72,10 @@ class Member:
         if not self.bonded:
             return corners[[0, -1]]
         parts = [corners[:1]]
+        if self.free_length:
+            along = (corners[1] - corners[0]) / np.linalg.norm(corners[1] - corners[0])
+            corners = np.concatenate([corners[:1] + self.free_length * along, corners[1:]])
+            parts.append(corners[:1])
         for start, end in zip(corners, corners[1:]):
             count = max(1, math.ceil(float(np.linalg.norm(end - start)) / (self.spacing or spacing) - 1e-6))
             parts.append(start + np.linspace(0, 1, count + 1)[1:, None] * (end - start))
@@ -78,11 +88,16 @@ def bar(
     tensile_strength: float = math.inf,
     compressive_strength: float = math.inf,
     prestress: float = 0.0,
+    bond_strength: float = math.inf,
+    free_length: float = 0.0,
+    connected: bool = False,
     spacing: float | None = None,
 ) -> Member:
     """A bar that moves with the soil along its whole length: a soil nail, a geogrid, the grouted body of an anchor.
 
-    Between bar and soil nothing slips: a bar is pulled out when the soil around it yields.
+    It slips along the soil where the force between both exceeds the strength of their bond, and is pulled out where this holds all
+    along it. Without a bond strength it is pulled out when the soil around it yields, which in plane strain is far too late for
+    nails and anchors: their bond is that of their surface, not of two planes.
 
     Args:
         points: two or more points of its line [m], shape (k, D).
@@ -90,17 +105,21 @@ def bar(
         tensile_strength: largest axial force [N/m], at which it yields; by default it stays elastic.
         compressive_strength: largest axial force in compression [N/m], a positive number; 0 for geogrids, which carry none.
         prestress: axial force with which it is installed [N/m], tension positive.
+        bond_strength: largest force between bar and soil per length of the bar [N/m2], [N/m] in three dimensions: the skin friction
+            times the circumference, over the distance of the bars in plane strain; of a geogrid that of both of its faces.
+        free_length: length from its first point on without any bond [m]: an anchor is a bar whose grouted body begins there.
+        connected: whether its first point does not slip, as the head of a nail at its plate or of an anchor at a wall.
         spacing: length of the segments into which it is divided [m]; by default about the distance of the nodes around it.
 
     Raises:
         InputError: a value is out of range.
 
     Example:
-        >>> nail = mpm.bar([(4.0, 6.0), (-2.0, 5.0)], axial_stiffness=70e6, tensile_strength=120e3)
+        >>> skin = 100e3 * math.pi * 0.1 / 1.5  # 100 kPa on a grout of 0.1 m, every 1.5 m
+        >>> nail = mpm.bar([(4.0, 6.0), (-2.0, 5.0)], 70e6, tensile_strength=120e3, bond_strength=skin, connected=True)
     """
-    return _checked(
-        Member(points, axial_stiffness, 0.0, tensile_strength, compressive_strength, math.inf, prestress, True, False, spacing)  # type: ignore[arg-type]
-    )
+    return _made(points, axial_stiffness, tensile_strength=tensile_strength, compressive_strength=compressive_strength,
+                 prestress=prestress, bond_strength=bond_strength, free_length=free_length, connected=connected, spacing=spacing)  # fmt: skip
 
 
 def strut(
@@ -130,10 +149,8 @@ def strut(
     Example:
         >>> strut = mpm.strut((5.0, 8.5), (0.0, 8.5), axial_stiffness=400e6, prestress=-50e3, fixed_end=True)
     """
-    ends = (start, end)
-    return _checked(
-        Member(ends, axial_stiffness, 0.0, tensile_strength, compressive_strength, math.inf, prestress, False, fixed_end)  # type: ignore[arg-type]
-    )
+    return _made((start, end), axial_stiffness, tensile_strength=tensile_strength, compressive_strength=compressive_strength,
+                 prestress=prestress, bonded=False, fixed_end=fixed_end)  # fmt: skip
 
 
 def beam(
@@ -141,18 +158,20 @@ def beam(
     axial_stiffness: float,
     bending_stiffness: float,
     plastic_moment: float = math.inf,
+    bond_strength: float = math.inf,
     spacing: float | None = None,
 ) -> Member:
     """A beam that bends with the soil: a sheet-pile or diaphragm wall, a row of piles, the lining of a tunnel. Plane strain only.
 
-    Its ends are free of moments. Shear strains are left out (Euler and Bernoulli). Where it has to slip along the soil, let the mesh
-    have a thin layer of weaker soil beside it.
+    Its ends are free of moments. Shear strains are left out (Euler and Bernoulli). It slips along the soil where the force between both
+    exceeds the strength of their bond, but does not part from it.
 
     Args:
         points: two or more points of its line [m], shape (k, 2).
         axial_stiffness: E A [N/m].
         bending_stiffness: E I [N m2/m].
         plastic_moment: largest bending moment [N m/m], at which a plastic hinge forms; by default it stays elastic.
+        bond_strength: largest force between both sides of the beam and the soil per length of the beam [N/m2].
         spacing: length of the segments into which it is divided [m]; by default about the distance of the nodes around it.
 
     Raises:
@@ -162,32 +181,36 @@ def beam(
         >>> wall = mpm.beam([(5.0, 10.0), (5.0, 2.0)], axial_stiffness=2.7e9, bending_stiffness=44e6)  # AZ 18
     """
     positive("bending_stiffness", bending_stiffness, "N m2/m")
-    return _checked(Member(points, axial_stiffness, bending_stiffness, plastic_moment=plastic_moment, spacing=spacing))  # type: ignore[arg-type]
+    return _made(points, axial_stiffness, bending_stiffness=bending_stiffness, plastic_moment=plastic_moment,
+                 bond_strength=bond_strength, spacing=spacing)  # fmt: skip
 
 
-def _checked(member: Member) -> Member:
-    """The member, with its points as tuples; raises InputError for values that are not possible."""
-    points = real_numbers("points", member.points)
+def _made(points: Any, axial_stiffness: float, **values: Any) -> Member:
+    """A member; raises InputError for values that are not possible."""
+    points = real_numbers("points", points)
     if points.ndim != 2 or len(points) < 2 or points.shape[1] not in (2, 3) or not np.all(np.isfinite(points)):
         raise InputError(f"points is {points.tolist()}, expected two or more finite points (x, y) or (x, y, z) [m]")
     if np.any(np.linalg.norm(np.diff(points, axis=0), axis=1) == 0):
         raise InputError(f"points is {points.tolist()}, expected points that differ from the one before")
-    if member.bending_stiffness and points.shape[1] == 3:
+    if "bending_stiffness" in values and points.shape[1] == 3:
         raise InputError(
             "points has three dimensions, expected two: beams are for plane strain, bars and struts for both"
         )
-    positive("axial_stiffness", member.axial_stiffness, "N/m")
-    for name in ("tensile_strength", "compressive_strength", "plastic_moment"):
-        within(name, getattr(member, name), 0.0, math.inf)
+    positive("axial_stiffness", axial_stiffness, "N/m")
+    for name in ("tensile_strength", "compressive_strength", "plastic_moment", "bond_strength"):
+        within(name, values.get(name, math.inf), 0.0, math.inf)
+    for name in ("fixed_end", "connected"):
+        flag(name, values.get(name, False))
+    if values.get("spacing") is not None:
+        positive("spacing", values["spacing"], "m")
+    member = Member(tuple(map(tuple, points.tolist())), axial_stiffness, **values)
     if member.tensile_strength == member.compressive_strength == 0:
         raise InputError(
             "tensile_strength and compressive_strength are 0, expected one above it: the member carries nothing"
         )
+    first = float(np.linalg.norm(points[1] - points[0]))
+    within("free_length", member.free_length, 0.0, first, open_above=True)
     within("prestress", member.prestress, -member.compressive_strength, member.tensile_strength)
-    if member.spacing is not None:
-        positive("spacing", member.spacing, "m")
-    flag("fixed_end", member.fixed_end)
-    object.__setattr__(member, "points", tuple(map(tuple, points.tolist())))
     return member
 
 

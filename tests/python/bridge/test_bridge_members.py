@@ -9,6 +9,8 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from fenics_bridge.structures.bond import bond_strengths, slip_tangent
+from mpm_core import _core
 
 COMM = MPI.COMM_WORLD
 LEFT, RIGHT, BOTTOM, TOP = 1, 2, 3, 4
@@ -177,6 +179,52 @@ def test_a_geogrid_carries_no_compression():
     assert fem.reaction(TOP)[1] == pytest.approx(1e6 * 0.005, rel=1e-9)
 
 
+@pytest.mark.parametrize(("degree", "cells"), [(1, 4), (2, 4), (1, 8)])
+def test_an_anchor_is_pulled_out_by_the_strength_of_its_bond(degree, cells):
+    """A block on rollers hangs on an anchor alone, whose body of 1.5 m slips under the force q L, on all meshes alike."""
+    bond, length = 4e3, 1.5
+    domain, _, facet_tags = bridge.box_mesh(COMM, (4.0, 2.0), (4 * cells, 2 * cells))
+    numbers = np.arange(bridge.original_cells(domain).size, dtype=np.int32)
+    x = compute_midpoints(domain, 2, numbers)[:, 0]
+    cell_tags = meshtags(domain, 2, numbers, np.where(x < 1, 1, np.where(x < 1.5, 2, 3)).astype(np.int32))
+    soil = mpm.LinearElastic(young=20e6, poisson=0.3)
+    supports = [bridge.fixed(LEFT), bridge.roller(BOTTOM, (0, 1))]
+    fem = bridge.QuasiStatic(domain, soil, facet_tags, supports, degree=degree, cell_tags=cell_tags)
+    anchor = mpm.bar([(0.7, 1.0), (3.5, 1.0)], 100e6, bond_strength=bond, free_length=1.3, connected=True)
+    fem.reconfigure(off=[2], members={"anchor": anchor})
+    fem.solve(bridge.Load(traction={RIGHT: (0.9 * bond * length / 2.0, 0.0)}))
+    assert fem.converged
+    forces = fem.member_forces("anchor")
+    assert forces.axial_force[0] == pytest.approx(0.9 * bond * length, rel=1e-6)
+    change = np.abs(np.diff(forces.axial_force))
+    middles = (forces.positions[1:, 0] + forces.positions[:-1, 0]) / 2
+    assert np.all(change[1:] <= bond * np.diff(middles)[1:] * (1 + 1e-9))
+    with pytest.warns(RuntimeWarning, match="the load was not reached"):
+        fem.solve(bridge.Load(traction={RIGHT: (1.1 * bond * length / 2.0, 0.0)}))
+    assert fem.member_forces("anchor").axial_force[0] == pytest.approx(bond * length, rel=2e-3)
+
+
+def test_the_stiffness_of_a_bar_that_slips_is_the_derivative_of_its_forces():
+    lengths, stiffness = np.array([0.5, 0.4, 0.6, 0.5, 0.3, 0.4]), 1e6
+    member = mpm.bar([(0.0, 0.0), (2.7, 0.0)], stiffness, tensile_strength=900.0, bond_strength=700.0, connected=True)
+    bond, limits = bond_strengths(member, lengths), (np.full(6, -np.inf), np.full(6, 900.0))
+    assert bond[0] == math.inf and bond[1:] == pytest.approx([315.0, 350.0, 385.0, 280.0, 245.0, 140.0])
+    strain = np.array([1.2e-3, 0.7e-3, 0.6e-3, 0.1e-3, 0.3e-3, 0.02e-3])
+
+    def forces(strains):
+        return _core.forces_with_slip(stiffness * strains, stiffness / lengths, *limits, bond)
+
+    found = forces(strain)
+    assert found[0] == 900.0 and found[3] - found[4] < 280.0  # the first yields, and some nodes stick
+    assert np.any(np.isclose(np.abs(np.diff(found)), bond[1:-1]))  # others slip
+    expected = stiffness * slip_tangent(found, limits, bond, lengths)
+    small = 1e-9
+    for k in range(6):
+        step = np.zeros(6)
+        step[k] = small
+        assert np.allclose((forces(strain + step) - found) / small, expected[:, k], atol=1e-3 * stiffness)
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -187,6 +235,11 @@ def test_a_geogrid_carries_no_compression():
         (lambda: mpm.bar([(0, 0), (1, 0)], 1e6, tensile_strength=0.0, compressive_strength=0.0), "carries nothing"),
         (lambda: mpm.bar([(0, 0), (1, 0)], 1e6, tensile_strength=1e3, prestress=2e3), "prestress is 2000.0"),
         (lambda: mpm.bar([(0, 0), (1, 0)], 1e6, spacing=-1.0), "spacing is -1.0 m"),
+        (lambda: mpm.bar([(0, 0), (1, 0)], 1e6, bond_strength=-1.0), "bond_strength is -1.0"),
+        (
+            lambda: mpm.bar([(0, 0), (1, 0)], 1e6, free_length=1.0),
+            "free_length is 1.0, expected 0.0 <= free_length < 1.0",
+        ),
         (lambda: mpm.beam([(0, 0), (1, 0)], 1e6, 0.0), "bending_stiffness is 0.0"),
         (lambda: mpm.beam([(0, 0, 0), (1, 0, 0)], 1e6, 1e6), "beams are for plane strain"),
         (lambda: mpm.strut((0, 0), (1, 0), 1e6, fixed_end="yes"), "fixed_end is 'yes'"),

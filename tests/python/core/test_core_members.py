@@ -74,6 +74,25 @@ def test_a_block_on_a_cable_swings_as_a_pendulum_by_a_large_angle():
     assert np.linalg.norm(moved - pivot) == pytest.approx(length, rel=2e-3)
 
 
+def test_blocks_that_part_are_held_by_the_bond_of_their_anchor():
+    """Its head is connected in the upper block, and its body of 0.4 m slips in the lower one under the force q L."""
+    bond, length, time = 3e3, 0.4, 0.05
+    model = block_model(boxes=(BLOCK, (1.0, 1.75, 1.5, 2.25)))
+    anchor = mpm.bar(
+        [(1.25, 2.0), (1.25, 0.55)], 20e6, bond_strength=bond, free_length=1.05, connected=True, spacing=0.1
+    )
+    model.install({"anchor": anchor})
+    upper = model.particles.position[:, 1] > 1.5
+    model.particles.set("velocity", np.where(upper[:, None], (0.0, 0.5), (0.0, -0.5)))
+    list(model.explicit(until=time))
+    forces = model.member_forces("anchor")
+    assert forces.axial_force[0] == pytest.approx(bond * length, rel=1e-9)
+    assert np.allclose(-np.diff(forces.axial_force), bond * 0.1 * np.array([0.5, 1.0, 1.0, 1.0]), rtol=1e-6)
+    p = model.particles
+    change = p.velocity[p.position[:, 1] > 1.5, 1].mean() - 0.5
+    assert change == pytest.approx(-bond * length / 500.0 * time, rel=0.05)  # at once but for the elastic beginning
+
+
 def test_members_between_bodies_conserve_momentum():
     model = block_model(boxes=(BLOCK, (1.0, 1.75, 1.5, 2.25)))
     model.install({"strut": mpm.strut((1.3, 0.9), (1.2, 1.9), 5e6)})
