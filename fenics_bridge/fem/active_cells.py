@@ -50,13 +50,15 @@ def reconfigure(
     was_off[points.off] = True
     new = was_off & np.repeat(there.x.array[points.cells] > 0, points.per_cell)
     given = given_stress(model, stress, new)
+    active = there if off else None
+    prepared = model._prepared_members(model.members if members is None else members, active)
     points.assign(np.where(there.x.array[: owned_cells(domain)] > 0, model._materials.number, -1), len(laws))
     take_over(model, new, laws, before, given)
     model.law, model.off = law, off
     _support(model, model.supports if supports is None else tuple(supports), there)
-    space, active = model.displacement.function_space, there if off else None
+    space = model.displacement.function_space
     model._loads = LoadVectors(space, model.facet_tags, model.cell_tags, active=active, radius=model.radius)
-    model._change_members(model.members if members is None else members)
+    model._members.change(prepared, model.displacement.x.array[: model._n_own])
     model._water = water
     if water is not None:
         model._loads.constant = _seepage_forces(space, water, there, model.radius)

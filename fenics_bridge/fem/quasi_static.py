@@ -362,8 +362,8 @@ class QuasiStatic(SupportedBody, PointFunctions):
         warn_of_motion(self)
         return steps
 
-    def _change_members(self, members: dict[str, Member]) -> None:
-        """Install, keep and remove members in the cells that are active now. Collective."""
+    def _prepared_members(self, members: dict[str, Member], active: Any) -> Any:
+        """Members for `Members.change`, in the cells where a function is 1; raises InputError before anything changes. Collective."""
         comm, dim = self.domain.comm, self.domain.geometry.dim
         if members:
             other = next((name for name, member in members.items() if member.dim != dim), None)
@@ -380,7 +380,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
                 if factored
                 else None,
             )
-        self._members.change(members, self._loads.active, self.displacement.x.array[: self._n_own])
+        return self._members.prepared(members, active)
 
     def _internal_forces(self) -> NDArray[np.float64]:
         """Nodal forces of the present stresses, and of the members. Collective."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import basix
@@ -29,16 +30,16 @@ class Embedding:
         space: Lagrange space of displacements.
         points: positions (n, D) [m], the same on all ranks.
         active: function that is 1 in cells that are there and 0 in others; None where all are.
-        what: what the points belong to, for the message.
+        owners: name of the member of each point, for the message.
 
     Raises:
         InputError: a point is in no active cell. Raised on all ranks alike.
     """
 
-    def __init__(self, space: Any, points: NDArray[np.float64], active: Any, what: str) -> None:
+    def __init__(self, space: Any, points: NDArray[np.float64], active: Any, owners: Sequence[str]) -> None:
         domain = space.mesh
         cells = _active_cells(domain, points, active)
-        mine = _mine(domain.comm, cells >= 0)
+        mine = _mine(domain, cells, points)
         weights = shape_functions(space, cells[mine], points[mine])
         index_map = space.dofmap.index_map
         numbers = global_numbers(index_map, index_map.size_local + index_map.num_ghosts)
@@ -49,7 +50,8 @@ class Embedding:
         if len(lost):
             where = ", ".join(f"{x:.6g}" for x in points[lost[0]])
             agree(
-                domain.comm, f"{what}: the point ({where}) m is in no soil that is there, expected points in the soil"
+                domain.comm,
+                f"the member {owners[lost[0]]!r}: the point ({where}) m is in no soil that is there, expected points in the soil",
             )
         back = np.argsort(order)
         self.nodes = np.concatenate([each for _, each, _ in found])[back]
@@ -58,31 +60,41 @@ class Embedding:
         """Their shape functions at the point, (n, k)"""
 
 
-def cell_size_along(domain: Any, line: NDArray[np.float64]) -> float:
-    """Median length of the edges of the cells along a line (k, D) [m]; 0 where the line is outside of the mesh. Collective."""
-    ends = np.linspace(0, len(line) - 1, SAMPLES)
-    part = np.minimum(ends.astype(int), len(line) - 2)
-    samples = line[part] + (ends - part)[:, None] * (line[part + 1] - line[part])
-    cells = _active_cells(domain, samples, None)
-    corners = domain.geometry.x[compat.cell_nodes(domain)[cells[cells >= 0]], : domain.geometry.dim]
+def cell_sizes_along(domain: Any, lines: Sequence[NDArray[np.float64]]) -> list[float]:
+    """Median length of the edges of the cells along each line (k, D) [m]; 0 where it is outside of the mesh. Collective."""
+    if not lines:
+        return []
+    samples = []
+    for line in lines:
+        ends = np.linspace(0, len(line) - 1, SAMPLES)
+        part = np.minimum(ends.astype(int), len(line) - 2)
+        samples.append(line[part] + (ends - part)[:, None] * (line[part + 1] - line[part]))
+    cells = _active_cells(domain, np.concatenate(samples), None).reshape(len(lines), SAMPLES)
     first, second = np.triu_indices(domain.geometry.dim + 1, 1)
-    edges = np.linalg.norm(corners[:, first] - corners[:, second], axis=2)
-    every = np.concatenate(domain.comm.allgather(edges.ravel()))
-    return float(np.median(every)) if len(every) else 0.0
+    sizes = []
+    for found in cells:
+        corners = domain.geometry.x[compat.cell_nodes(domain)[found[found >= 0]], : domain.geometry.dim]
+        edges = np.linalg.norm(corners[:, first] - corners[:, second], axis=2)
+        every = np.concatenate(domain.comm.allgather(edges.ravel()))
+        sizes.append(float(np.median(every)) if len(every) else 0.0)
+    return sizes
 
 
 def shape_functions(space: Any, cells: NDArray[np.int32], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Shape functions (n, k) of a Lagrange space at points (n, D) in this rank's cells (n,)."""
-    domain = space.mesh
-    dim = domain.geometry.dim
-    corners = domain.geometry.x[compat.cell_nodes(domain)[cells], :dim]
-    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    reference = np.linalg.solve(edges, (points - corners[:, 0])[:, :, None])[:, :, 0]
-    kind = basix.CellType.triangle if dim == 2 else basix.CellType.tetrahedron
+    kind = basix.CellType.triangle if space.mesh.geometry.dim == 2 else basix.CellType.tetrahedron
     element = basix.create_element(
         basix.ElementFamily.P, kind, compat.degree_of(space), basix.LagrangeVariant.gll_warped
     )
+    reference = _reference(space.mesh, cells, points)
     return element.tabulate(0, reference)[0].reshape(len(cells), element.dim)
+
+
+def _reference(domain: Any, cells: NDArray[np.int32], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (n, D) in this rank's cells (n,), in the coordinates of the reference cell."""
+    corners = domain.geometry.x[compat.cell_nodes(domain)[cells], : domain.geometry.dim]
+    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    return np.linalg.solve(edges, (points - corners[:, 0])[:, :, None])[:, :, 0]
 
 
 def _active_cells(domain: Any, points: NDArray[np.float64], active: Any) -> NDArray[np.int32]:
@@ -94,7 +106,10 @@ def _active_cells(domain: Any, points: NDArray[np.float64], active: Any) -> NDAr
     return np.where(there[cells] > 0, cells, -1).astype(np.int32) if len(there) else cells
 
 
-def _mine(comm: Any, found: NDArray[np.bool_]) -> NDArray[np.integer]:
-    """Points that this rank is the first to have found."""
-    first = np.argmax(comm.allgather(found), axis=0)
-    return np.flatnonzero(found & (first == comm.rank))
+def _mine(domain: Any, cells: NDArray[np.int32], points: NDArray[np.float64]) -> NDArray[np.integer]:
+    """Points that lie deepest in a cell of this rank: another may have a cell from which they are a little outside."""
+    here, depth = np.flatnonzero(cells >= 0), np.full(len(points), -np.inf)
+    reference = _reference(domain, cells[here], points[here])
+    depth[here] = np.minimum(reference.min(axis=1, initial=np.inf), 1 - reference.sum(axis=1))
+    first = np.argmax(domain.comm.allgather(depth), axis=0)
+    return here[first[here] == domain.comm.rank]

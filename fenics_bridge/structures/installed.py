@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from scipy import sparse
 
 from fenics_bridge import compat
 from fenics_bridge.structures.bond import bond_strengths, slip_tangent
-from fenics_bridge.structures.embedding import Embedding, cell_size_along
+from fenics_bridge.structures.embedding import Embedding, cell_sizes_along
 from mpm_core import _core
 
 
@@ -29,11 +29,10 @@ class _Installed:
     """Length over which each strain acts [m], (k,)"""
     force: NDArray[np.float64]
     """Axial force of each segment [N], then moment at each inner node [N m], (k,)"""
-    origin: NDArray[np.float64]
-    """Displacement of the nodes at the installation [m], (n, D)"""
+    origin: Any
+    """Displacement of the nodes at the installation [m], (n, D); None before it"""
     stressing: bool
     """Whether it is being stressed: its axial forces stay what they are"""
-    embedding: Any = None
     movement: Any = None
     """Matrix of the displacements of the nodes by those of the body's nodes (n D, dofs)"""
     strain: Any = None
@@ -96,27 +95,38 @@ class Members:
         """The members by name."""
         return {name: one.member for name, one in self._there.items()}
 
-    def change(self, members: dict[str, Member], active: Any, displacement: NDArray[np.float64]) -> None:
-        """Keep the members of these names, remove others, and install those that are new. Collective.
+    def prepared(self, members: dict[str, Member], active: Any) -> dict[str, _Installed]:
+        """These members for `change`: those that are there with what they carry, and new ones. Changes nothing. Collective.
 
         Args:
             members: the members that are there from now on.
             active: function that is 1 in the cells that are there and 0 in others; None where all are.
-            displacement: displacements of this rank's own dofs now [m].
 
         Raises:
             InputError: a node of a member is in no soil that is there. Raised on all ranks alike.
         """
-        self.lock_off()
-        there: dict[str, _Installed] = {}
-        for name, member in members.items():
-            kept = self._there.get(name)
-            there[name] = kept if kept is not None and kept.member == member else self._installed(member)
-            self._embed(name, there[name], active)
-            if there[name] is not kept:
-                there[name].origin = self._moved(there[name], displacement)
-        self._there = there
-        self._strains = sparse.vstack([one.strain for one in there.values()]).tocsr() if there else None
+        kept = {name: one for name, one in self._there.items() if members.get(name) == one.member}
+        new = [name for name in members if name not in kept]
+        sizes = cell_sizes_along(self._space.mesh, [np.array(members[name].points) for name in new])
+        installed = {name: self._installed(members[name], size) for name, size in zip(new, sizes)}
+        there = {name: replace(kept[name]) if name in kept else installed[name] for name in members}
+        self._embed(there, active)
+        return there
+
+    def change(self, prepared: dict[str, _Installed], displacement: NDArray[np.float64]) -> None:
+        """Keep and install the members that `prepared` returns, and remove others. Collective.
+
+        Args:
+            prepared: the members.
+            displacement: displacements of this rank's own dofs now [m].
+        """
+        self._there = prepared
+        for one in prepared.values():
+            if one.origin is None:
+                one.origin = self._moved(one, displacement)
+            else:
+                one.stressing = False
+        self._strains = sparse.vstack([one.strain for one in prepared.values()]).tocsr() if prepared else None
         self.back()
 
     def lock_off(self) -> None:
@@ -193,30 +203,38 @@ class Members:
         moved = self._moved(one, displacement) - one.origin
         return MemberForces(one.nodes, moved, one.force[: one.segments].copy(), moment)
 
-    def _installed(self, member: Member) -> _Installed:
-        """A member without any strain."""
-        degree = min(2, compat.degree_of(self._space))
-        spacing = cell_size_along(self._space.mesh, np.array(member.points)) / degree or member.length
-        nodes = member.nodes(spacing)
+    def _installed(self, member: Member, size: float) -> _Installed:
+        """A member without any strain; size: of the cells around it [m]."""
+        nodes = member.nodes(size / min(2, compat.degree_of(self._space)) or member.length)
         strains = member_strains(nodes, member.bending_stiffness > 0)
         force = np.zeros(len(strains.lengths))
         force[: strains.segments] = member.prestress
         return _Installed(
-            member, nodes, strains.segments, strains.lengths, force, np.zeros_like(nodes), member.prestress != 0
+            member, nodes, strains.segments, strains.lengths, force, None, member.prestress != 0
         )
 
-    def _embed(self, name: str, one: _Installed, active: Any) -> None:
-        """Find the cells around the nodes of a member."""
+    def _embed(self, there: dict[str, _Installed], active: Any) -> None:
+        """Find the cells around the nodes of members, all in one search."""
+        moving = [one.nodes[:-1] if one.member.fixed_end else one.nodes for one in there.values()]
+        if not moving:
+            return
+        owners = [name for name, nodes in zip(there, moving) for _ in nodes]
+        embedding = Embedding(self._space, np.concatenate(moving), active, owners)
+        start = 0
+        for one, nodes in zip(there.values(), moving):
+            rows = slice(start, start + len(nodes))
+            self._move_by(one, embedding.nodes[rows], embedding.weights[rows])
+            start += len(nodes)
+
+    def _move_by(self, one: _Installed, nodes: NDArray[np.integer], weights: NDArray[np.float64]) -> None:
+        """Let the first nodes of a member move by the body's nodes (n, k), with these shape functions (n, k)."""
         count, dim = one.nodes.shape
-        moving = one.nodes[:-1] if one.member.fixed_end else one.nodes
-        embedding = Embedding(self._space, moving, active, f"the member {name!r}")
         components = np.arange(dim)
-        columns = (dim * embedding.nodes[:, None, :] + components[:, None]).ravel()
+        columns = (dim * nodes[:, None, :] + components[:, None]).ravel()
         rows = np.broadcast_to(
-            (dim * np.arange(len(moving))[:, None] + components)[:, :, None],
-            (len(moving), dim, embedding.nodes.shape[1]),
+            (dim * np.arange(len(nodes))[:, None] + components)[:, :, None], (len(nodes), dim, nodes.shape[1])
         )
-        values = np.broadcast_to(embedding.weights[:, None, :], rows.shape)
+        values = np.broadcast_to(weights[:, None, :], rows.shape)
         one.movement = sparse.csr_matrix((values.ravel(), (rows.ravel(), columns)), (count * dim, self._n))
         operator = member_strains(one.nodes, one.member.bending_stiffness > 0).operator
         one.strain = sparse.csr_matrix(operator.reshape(len(operator), -1)) @ one.movement

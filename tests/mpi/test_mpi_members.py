@@ -40,6 +40,21 @@ def test_members_carry_the_same_on_all_numbers_of_ranks():
             assert np.allclose(values, exact, rtol=0, atol=1e-6 * max(np.abs(exact).max(), 1e-9))
 
 
+def test_nodes_beside_the_border_of_ranks_move_with_the_cell_that_contains_them():
+    """A node 1 % of a cell away from any line of the mesh is a little outside of the cells on its other side."""
+
+    def forces(comm, x):
+        domain, cell_tags, facet_tags = bridge.box_mesh(comm, (4.0, 4.0), (8, 8))
+        soil = mpm.LinearElastic(young=1e6, poisson=0.3)
+        fem = bridge.QuasiStatic(domain, soil, facet_tags, [bridge.fixed(3)], degree=1, cell_tags=cell_tags)
+        fem.reconfigure(members={"tie": mpm.strut((x, 3.0), (x + 0.3, 1.2), 10e6)})
+        fem.solve(bridge.Load(pressure={4: 10e3}, traction={4: (10e3, 0.0)}))
+        return fem.member_forces("tie").axial_force
+
+    for x in np.arange(0.505, 3.6, 0.5):
+        assert np.allclose(forces(COMM, x), forces(MPI.COMM_SELF, x), rtol=1e-9)
+
+
 def sliding(comm, rebalance=None):
     """A leaning wall and a tie in soft ground that slides over the borders of ranks, and what they carry."""
     domain, cell_tags, facet_tags = bridge.box_mesh(comm, (6.0, 3.0), (24, 12))

@@ -280,3 +280,22 @@ def test_stages_that_install_and_remove_what_is_not_there_are_errors():
         site.carry_out(bridge.Stage("list", install=[nail]))
     with pytest.raises(mpm.InputError, match=r"name is 'tie', expected one of \['nail'\]"):
         fem.member_forces("tie")
+
+
+def test_a_stage_that_digs_soil_away_from_a_member_changes_nothing():
+    domain, _, facet_tags = bridge.box_mesh(COMM, (4.0, 2.0), (16, 8))
+    cells = np.arange(bridge.original_cells(domain).size, dtype=np.int32)
+    x, y, _ = compute_midpoints(domain, 2, cells).T
+    cell_tags = meshtags(domain, 2, cells, np.where((x < 2) & (y > 1), 2, 1).astype(np.int32))
+    soil, supports = mpm.LinearElastic(young=10e6, poisson=0.3), [bridge.fixed(BOTTOM), bridge.roller(LEFT, (1, 0))]
+    fem = bridge.QuasiStatic(domain, soil, facet_tags, supports, cell_tags=cell_tags)
+    site = bridge.FemSite(fem)
+    nail = {"nail": mpm.bar([(1.0, 1.5), (3.0, 1.4)], 10e6)}
+    site.carry_out(bridge.Stage("ground", fill=[1, 2], unit_weight={1: 20e3, 2: 20e3}, install=nail))
+    stress = fem.points.stress.copy()
+    with pytest.raises(mpm.InputError, match="the member 'nail': the point .* is in no soil that is there"):
+        site.carry_out(bridge.Stage("cut", excavate=2))
+    assert np.array_equal(fem.points.stress, stress)
+    assert tuple(fem.off) == ()
+    site.carry_out(bridge.Stage("nothing"))
+    assert np.allclose(fem.points.stress, stress, atol=1e-6 * np.abs(stress).max())
