@@ -90,8 +90,6 @@ def collapse_load(
     problem = f"load_of is {load_of!r}, expected a function of a number that returns a Load"
     agree(model.domain.comm, None if callable(load_of) else problem)
     warn_of_locking_at_failure(model)
-    if isinstance(model, QuasiStatic):
-        model._members.lock_off()
     found = _follow(model, lambda value: model.equilibrate(load_of(value)), start, first_step, tolerance, progress)
     model.converged = True  # under the load of the last equilibrium, whatever the steps above it
     warn_of_few_cells(model, found.mechanism)

@@ -90,6 +90,8 @@ class FemSite:
         state, _, _ = self.state.after(stage)
         if stage.reset_displacement:
             fem.reset_displacement()
+        if replaced := set(stage.remove).intersection(stage.install):
+            fem.reconfigure(members={name: one for name, one in fem.members.items() if name not in replaced})
         steps = fem.solve(self._enter(state, stage.stress), **self._options)
         self.number += 1
         if not fem.converged:

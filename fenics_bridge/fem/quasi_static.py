@@ -182,7 +182,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
             law: law, or laws by cell tag, from now on; where the law changes, its state is reset.
             members: the structural members that are there from now on by name, from `mpm_core.bar`, `strut` and `beam`; {} for
                 none, None for the present ones. A new one is installed without strain, as the soil is deformed now, and with its
-                prestress, which is constant until `solve` has reached its load.
+                prestress, which is constant until the out-of-balance forces are released.
 
         Raises:
             InputError: an unknown tag, values of another shape or not finite, or a member outside of the soil. Raised on all ranks
@@ -246,7 +246,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         return self._body.solver.iterations
 
     def set_initial_stress(self, stress: ArrayLike, load: Load) -> None:
-        """Start from a given stress, meant for the given load, undeformed. Collective.
+        """Start from a given stress, meant for the given load, undeformed, members with their prestress alone. Collective.
 
         Call `equilibrate(load)` afterwards, which moves the body by the out-of-balance part of the stress.
 
@@ -263,6 +263,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
         self.points.stress[:] = stress
         self.points.reset_state(self.laws)
         self.displacement.x.array[:] = 0.0
+        self._members.reset()
         self.load = load
 
     def set_parameter(self, name: str, values: Field | dict[int | str, float]) -> None:
@@ -321,6 +322,8 @@ class QuasiStatic(SupportedBody, PointFunctions):
         if report.converged:
             self.points.time += duration if np.isfinite(duration) else 0.0
             self.load, self.law = self._loads.resolved(load), law
+            if load.held == 0:
+                self._members.lock_off()
             return report
         self._follow(self.laws)
         return replace(report, reason=explained(self, report.reason, load), cause=report.reason)
@@ -357,8 +360,6 @@ class QuasiStatic(SupportedBody, PointFunctions):
         load = self._loads.resolved(load)
         warn_of_weight(self.domain.comm, load, self.cell_tags)
         steps = raise_load(self, load, first_step, tolerance, progress)
-        if self.converged:
-            self._members.lock_off()
         warn_of_motion(self)
         return steps
 

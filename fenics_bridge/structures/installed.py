@@ -59,6 +59,10 @@ class _Installed:
         slipping = slip_tangent(force[:n], (least[:n], largest[:n]), bond, self.lengths[:n])
         return force, sparse.block_diag([stiffness[:n, None] * slipping, tangent.tocsr()[n:, n:]])
 
+    def unstrained(self) -> NDArray[np.float64]:
+        """Forces without strain: the prestress."""
+        return np.where(self._is_axial(), self.member.prestress, 0.0)
+
     def _is_axial(self) -> NDArray[np.bool_]:
         return np.arange(len(self.lengths)) < self.segments
 
@@ -207,11 +211,10 @@ class Members:
         """A member without any strain; size: of the cells around it [m]."""
         nodes = member.nodes(size / min(2, compat.degree_of(self._space)) or member.length)
         strains = member_strains(nodes, member.bending_stiffness > 0)
-        force = np.zeros(len(strains.lengths))
-        force[: strains.segments] = member.prestress
-        return _Installed(
-            member, nodes, strains.segments, strains.lengths, force, None, member.prestress != 0
-        )
+        lengths = strains.lengths
+        one = _Installed(member, nodes, strains.segments, lengths, np.zeros(0), None, member.prestress != 0)
+        one.force = one.unstrained()
+        return one
 
     def _embed(self, there: dict[str, _Installed], active: Any) -> None:
         """Find the cells around the nodes of members, all in one search."""
@@ -252,6 +255,13 @@ class Members:
 
     def _lengths(self) -> NDArray[np.float64]:
         return np.concatenate([one.lengths for one in self._there.values()])
+
+    def reset(self) -> None:
+        """Start with the prestress alone, the displacements of the body being zero."""
+        self.reset_displacement()
+        for one in self._there.values():
+            one.force, one.stressing = one.unstrained(), one.member.prestress != 0
+        self.back()
 
     def reset_displacement(self) -> None:
         """Count displacements from now on, those of the body being zero."""

@@ -135,6 +135,57 @@ def test_a_prestress_that_a_load_without_stages_has_reached_follows_the_strain()
     assert forces.axial_force[0] < 30e3
 
 
+def tied():
+    """A block of elastic soil with a prestressed tie that has not been stressed yet."""
+    fem = body((3.0, 1.0), (12, 4), mpm.LinearElastic(young=5e6, poisson=0.2), [bridge.fixed(LEFT)])
+    tie = {"tie": mpm.strut((3.0, 0.5), (5.0, 0.5), 5e6, prestress=30e3, fixed_end=True)}
+    fem.reconfigure(members=tie)
+    return fem, tie
+
+
+def test_a_prestress_follows_the_strain_after_the_equilibrium_that_stresses_it():
+    fem, _ = tied()
+    assert fem.equilibrate(bridge.Load()).converged
+    assert fem.member_forces("tie").axial_force == pytest.approx([30e3])
+    before = fem.member_forces("tie").displacement[0, 0]
+    assert fem.equilibrate(bridge.Load(pressure={RIGHT: -10e3})).converged
+    forces = fem.member_forces("tie")
+    slackened = forces.displacement[0, 0] - before
+    assert slackened > 0
+    assert forces.axial_force == pytest.approx([30e3 - 5e6 * slackened / 2.0], rel=1e-9)
+
+
+def test_a_search_for_collapse_begins_with_the_whole_prestress():
+    fem, _ = tied()
+    first = []
+    bridge.collapse_load(
+        fem, lambda q: bridge.Load(pressure={TOP: q}), first_step=1.0, tolerance=0.5,
+        progress=lambda step: first.append(fem.member_forces("tie").axial_force[0]),
+    )  # fmt: skip
+    assert first[0] == pytest.approx(30e3)
+
+
+def test_a_given_initial_stress_leaves_members_undeformed():
+    fem, _ = tied()
+    fem.solve(bridge.Load())
+    fem.solve(bridge.Load(pressure={RIGHT: -10e3}))
+    fem.set_initial_stress(np.zeros_like(fem.points.stress), bridge.Load())
+    forces = fem.member_forces("tie")
+    assert forces.axial_force == pytest.approx([30e3])
+    assert np.all(forces.displacement == 0.0)
+
+
+def test_a_member_that_a_stage_removes_and_installs_is_stressed_anew():
+    tie = tied()[1]
+    fem = body((3.0, 1.0), (12, 4), mpm.LinearElastic(young=5e6, poisson=0.2), [bridge.fixed(LEFT)])
+    site = bridge.FemSite(fem)
+    site.carry_out(bridge.Stage("tie", fill=fem.soils, unit_weight=dict.fromkeys(fem.soils, 0.0), install=tie))
+    site.carry_out(bridge.Stage("pull", pressure={RIGHT: -10e3}))
+    assert fem.member_forces("tie").axial_force[0] < 29e3
+    site.carry_out(bridge.Stage("again", remove="tie", install=tie))
+    assert fem.member_forces("tie").axial_force == pytest.approx([30e3])
+
+
 def slab(thick=0.1):
     """A strong slab 6 m long on a thin layer of clay on a rigid base; the strength of the clay is 10 kPa."""
     domain, _, facet_tags = bridge.box_mesh(COMM, (6.0, 0.3), (60, 6))
