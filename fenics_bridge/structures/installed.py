@@ -207,6 +207,15 @@ class Members:
         moved = self._moved(one, displacement) - one.origin
         return MemberForces(one.nodes, moved, one.force[: one.segments].copy(), moment)
 
+    def moved(self, name: str, displacement: NDArray[np.float64]) -> Any:
+        """Displacements of a member's nodes, those of the soil before its installation among them (n, D) [m]. Collective.
+
+        Args:
+            name: name of the member.
+            displacement: displacements of this rank's own dofs [m].
+        """
+        return self._moved(self._there[name], displacement)
+
     def _installed(self, member: Member, size: float) -> _Installed:
         """A member without any strain; size: of the cells around it [m]."""
         nodes = member.nodes(size / min(2, compat.degree_of(self._space)) or member.length)

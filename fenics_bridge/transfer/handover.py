@@ -282,11 +282,12 @@ def _members_mistake(model: mpm.Model, fem: Any) -> str | None:
 
 
 def _take_members(model: mpm.Model, fem: Any, move: bool) -> None:
-    """Install the structural members of the finite elements, with their forces. Collective."""
-    members = getattr(fem, "members", {})
-    forces = {name: fem.member_forces(name) for name in members}
-    if not move:
-        forces = {name: replace(one, displacement=np.zeros_like(one.displacement)) for name, one in forces.items()}
+    """Install the structural members of the finite elements, with their forces, where the soil around them goes. Collective."""
+    members, forces = getattr(fem, "members", {}), {}
+    for name in members:
+        given = fem.member_forces(name)
+        moved = fem._members.moved(name, fem.displacement.x.array[: fem._n_own])
+        forces[name] = replace(given, displacement=moved if move else np.zeros_like(moved))
     model.install(members, forces)
 
 
