@@ -163,11 +163,13 @@ class ParticleSite:
             site.fem.converged = reached
 
     def _refuse_members(self, stage: Stage) -> None:
-        problem = (
-            f"stage {stage.name!r}: install is {list(stage.install)}, expected none: quasi-static particles have no members; take_over "
-            "has those of finite elements"
-        )
-        agree(self.model.comm, problem if stage.install else None)
+        where, expected = f"stage {stage.name!r}: ", "quasi-static particles have no members"
+        problem = None
+        if stage.install:
+            problem = f"{where}install is {list(stage.install)}, expected none: {expected}; take_over has those of finite elements"
+        elif self.model.members:
+            problem = f"{where}the model has the members {list(self.model.members)}, expected no stage after take_over: {expected}"
+        agree(self.model.comm, problem)
 
     def rows_of(self, soil: int | str) -> NDArray[np.bool_]:
         """Whether each particle of this rank is of a soil. Collective.

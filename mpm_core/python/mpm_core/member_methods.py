@@ -48,6 +48,15 @@ class MemberMethods:
         """
         model, known = cast("Model", self), forces or {}
         collectively(model.comm, lambda: _require_members(model, members, known))
+        before = members_entry(model)
+        try:
+            self._install(members, known)
+        except InputError:
+            take_members(model, before)
+            raise
+
+    def _install(self, members: dict[str, Member], known: dict[str, MemberForces]) -> None:
+        model = cast("Model", self)
         for name, member in members.items():
             if name in known:
                 given = known[name]
@@ -117,6 +126,13 @@ def _require_members(model: Model, members: dict[str, Member], forces: dict[str,
     unknown = next((name for name in forces if name not in members), None)
     if unknown is not None:
         raise InputError(f"forces has {unknown!r}, expected names of members: {list(members)}")
+    for name, given in forces.items():
+        n, dim = len(given.positions), members[name].dim
+        shapes = {"positions": (n, dim), "displacement": (n, dim), "axial_force": (n - 1,), "moment": (n,)}
+        for part, shape in shapes.items():
+            values = np.asarray(getattr(given, part))
+            if values.shape != shape or n < 2 or not np.all(np.isfinite(values)):
+                raise InputError(f"forces: {part} of {name!r} has shape {values.shape}, expected {shape} of finite numbers")
 
 
 def _size_along(model: Model, line: NDArray[np.float64]) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -49,7 +49,7 @@ class Member:
     """Whether the member moves with the soil along its whole length, or only its two ends do"""
     fixed_end: bool = False
     """Whether its last point is held in space"""
-    spacing: float | None = field(default=None)
+    spacing: float | None = None
     """Length of the segments into which it is divided [m]; None for a length that suits the cells"""
 
     @property
@@ -180,38 +180,36 @@ def beam(
     Example:
         >>> wall = mpm.beam([(5.0, 10.0), (5.0, 2.0)], axial_stiffness=2.7e9, bending_stiffness=44e6)  # AZ 18
     """
-    positive("bending_stiffness", bending_stiffness, "N m2/m")
+    bending_stiffness = float(positive("bending_stiffness", bending_stiffness, "N m2/m"))
     return _made(points, axial_stiffness, bending_stiffness=bending_stiffness, plastic_moment=plastic_moment,
                  bond_strength=bond_strength, spacing=spacing)  # fmt: skip
 
 
 def _made(points: Any, axial_stiffness: float, **values: Any) -> Member:
-    """A member; raises InputError for values that are not possible."""
+    """A member of plain numbers, which checkpoints can hold; raises InputError for values that are not possible."""
     points = real_numbers("points", points)
     if points.ndim != 2 or len(points) < 2 or points.shape[1] not in (2, 3) or not np.all(np.isfinite(points)):
         raise InputError(f"points is {points.tolist()}, expected two or more finite points (x, y) or (x, y, z) [m]")
-    if np.any(np.linalg.norm(np.diff(points, axis=0), axis=1) == 0):
+    edges = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if np.any(edges == 0):
         raise InputError(f"points is {points.tolist()}, expected points that differ from the one before")
     if "bending_stiffness" in values and points.shape[1] == 3:
-        raise InputError(
-            "points has three dimensions, expected two: beams are for plane strain, bars and struts for both"
-        )
-    positive("axial_stiffness", axial_stiffness, "N/m")
-    for name in ("tensile_strength", "compressive_strength", "plastic_moment", "bond_strength"):
-        within(name, values.get(name, math.inf), 0.0, math.inf)
-    for name in ("fixed_end", "connected"):
-        flag(name, values.get(name, False))
+        raise InputError("points has three dimensions, expected two: beams are for plane strain, bars and struts for both")
+    for name in {"tensile_strength", "compressive_strength", "plastic_moment", "bond_strength"}.intersection(values):
+        values[name] = within(name, values[name], 0.0, math.inf)
+    for name in {"fixed_end", "connected"}.intersection(values):
+        values[name] = bool(flag(name, values[name]))
     if values.get("spacing") is not None:
-        positive("spacing", values["spacing"], "m")
-    member = Member(tuple(map(tuple, points.tolist())), axial_stiffness, **values)
+        values["spacing"] = float(positive("spacing", values["spacing"], "m"))
+    values["free_length"] = within("free_length", values.get("free_length", 0.0), 0.0, float(edges[0]), open_above=True)
+    stiffness = float(positive("axial_stiffness", axial_stiffness, "N/m"))
+    member = Member(tuple(map(tuple, points.tolist())), stiffness, **values)
     if member.tensile_strength == member.compressive_strength == 0:
-        raise InputError(
-            "tensile_strength and compressive_strength are 0, expected one above it: the member carries nothing"
-        )
-    first = float(np.linalg.norm(points[1] - points[0]))
-    within("free_length", member.free_length, 0.0, first, open_above=True)
-    within("prestress", member.prestress, -member.compressive_strength, member.tensile_strength)
-    return member
+        raise InputError("tensile_strength and compressive_strength are 0, expected one above it: the member carries nothing")
+    prestress = within("prestress", member.prestress, -member.compressive_strength, member.tensile_strength)
+    if math.isinf(prestress):
+        raise InputError(f"prestress is {prestress}, expected a finite number")
+    return replace(member, prestress=prestress)
 
 
 @dataclass(frozen=True)

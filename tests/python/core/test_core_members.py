@@ -251,3 +251,62 @@ def test_a_hand_over_with_members_asks_for_no_equilibration():
     model.install({"nail": mpm.bar([(3.1, 2.5), (5.2, 2.1)], 20e6)})
     with pytest.raises(mpm.InputError, match="model has the member 'nail', expected it in fem only"):
         bridge.initialise(model, fem, equilibrate=False)
+
+
+def test_members_go_where_the_soil_goes_that_has_settled_before_them():
+    """Elastic ground of 3 m settles by w = γ (2 H y - y²) / (2 M) at the height y, before its bar is installed."""
+    mesh = bridge.box_mesh(COMM, (3.0, 4.0), (12, 16), body=((0.0, 0.0), (3.0, 3.0)))
+    soil, supports = mpm.LinearElastic(young=1e6, poisson=0.0), [bridge.fixed(BOTTOM), bridge.roller(LEFT, (1, 0))]
+    supports.append(bridge.roller(RIGHT, (1, 0)))
+    body, _, facet_tags = bridge.soil_mesh(*mesh, tag=[bridge.BODY])
+    fem = bridge.QuasiStatic(body, soil, facet_tags, supports)
+    fem.solve(bridge.Load(unit_weight=20e3))
+    fem.reconfigure(members={"bar": mpm.bar([(0.5, 2.0), (2.5, 2.0)], 1e6)})
+    fem.solve(bridge.Load(unit_weight=20e3))
+    model = mpm.Model(bridge.background_mesh(*mesh), soil)
+    model.seed(density=2000.0, per_cell=3, cell_tag=bridge.BODY)
+    bridge.apply_supports(model, supports)
+    model.set_gravity((0.0, -10.0))
+    bridge.initialise(model, fem, move=True, equilibrate=False)
+    settled = 20e3 * (2 * 3 * 2 - 2**2) / 2e6
+    assert np.allclose(model.member_forces("bar").positions[:, 1], 2.0 - settled, atol=1e-6)
+
+
+def test_a_checkpoint_holds_members_of_numpy_numbers(tmp_path):
+    model = block_model()
+    bar = mpm.bar(
+        [(1.1, 0.6), (1.4, 0.9)], np.int64(5_000_000), tensile_strength=np.float32(1e3), spacing=np.float32(0.5)
+    )
+    model.install({"bar": bar})
+    model.save(tmp_path / "state.h5")
+    assert model.members == {"bar": mpm.bar([(1.1, 0.6), (1.4, 0.9)], 5e6, tensile_strength=1e3, spacing=0.5)}
+
+
+def test_members_of_which_one_does_not_fit_are_not_installed():
+    model = block_model()
+    model.install({"tie": mpm.bar([(1.1, 0.6), (1.4, 0.9)], 5e6)})
+    near, far = mpm.bar([(1.1, 0.6), (1.4, 0.6)], 5e6), mpm.bar([(1.25, 0.75), (1.25, 4.0)], 5e6)
+    with pytest.raises(mpm.InputError, match="structural member 'far'"):
+        model.install({"near": near, "far": far})
+    assert list(model.members) == ["tie"]
+    short = mpm.MemberForces(np.array([(1.1, 0.6), (1.2, 0.6), (1.4, 0.6)]), np.zeros((3, 2)), np.ones(1), np.zeros(3))
+    with pytest.raises(mpm.InputError, match=r"forces: axial_force of 'near' has shape \(1,\), expected \(2,\)"):
+        model.install({"near": near}, {"near": short})
+    with pytest.raises(mpm.InputError, match="prestress is inf, expected a finite number"):
+        mpm.bar([(0, 0), (1, 0)], 5e6, prestress=math.inf)
+
+
+def test_a_stage_of_particles_after_members_were_taken_over_changes_nothing():
+    domain, cell_tags, facet_tags = bridge.box_mesh(COMM, (4.0, 2.0), (16, 8))
+    soil, supports = mpm.LinearElastic(young=10e6, poisson=0.3), [bridge.fixed(BOTTOM)]
+    fem = bridge.QuasiStatic(domain, soil, facet_tags, supports, degree=1, cell_tags=cell_tags)
+    staged, soils = bridge.FemSite(fem), fem.soils
+    nail = {"nail": mpm.bar([(1.0, 1.5), (3.0, 1.4)], 10e6)}
+    staged.carry_out(bridge.Stage("ground", fill=soils, unit_weight=dict.fromkeys(soils, 20e3), install=nail))
+    model = mpm.Model(bridge.background_mesh(domain, cell_tags, facet_tags), soil)
+    site = bridge.ParticleSite(model, dict.fromkeys(soils, 0), supports, per_cell=3)
+    site.take_over(staged)
+    with pytest.raises(mpm.InputError, match="stage 'load': the model has the members .'nail'., expected no stage"):
+        site.carry_out(bridge.Stage("load", pressure={TOP: 10e3}))
+    assert site.number == 1
+    assert site.state.pressure == {}
