@@ -377,7 +377,7 @@ class QuasiStatic(SupportedBody, PointFunctions):
             agree(
                 comm,
                 f"members with nmd=True in more than {AVERAGED_LIMIT} nodes of three dimensions, expected degree=2, or the option "
-                "pc_type lu"
+                f"-{self._options_prefix}pc_type lu"
                 if factored
                 else None,
             )
