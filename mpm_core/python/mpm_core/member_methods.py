@@ -118,6 +118,8 @@ def refuse_members(model: Model, scheme: str) -> None:
 
 
 def _require_members(model: Model, members: dict[str, Member], forces: dict[str, MemberForces]) -> None:
+    if members and model.geometry == _core.Geometry.AXISYMMETRIC:
+        raise InputError("members in an axisymmetric model, expected plane strain or three dimensions")
     for name, member in of_members(members).items():
         if name in model._members:
             raise InputError(f"members: {name!r} is installed already")
@@ -132,7 +134,9 @@ def _require_members(model: Model, members: dict[str, Member], forces: dict[str,
         for part, shape in shapes.items():
             values = np.asarray(getattr(given, part))
             if values.shape != shape or n < 2 or not np.all(np.isfinite(values)):
-                raise InputError(f"forces: {part} of {name!r} has shape {values.shape}, expected {shape} of finite numbers")
+                raise InputError(
+                    f"forces: {part} of {name!r} has shape {values.shape}, expected {shape} of finite numbers"
+                )
 
 
 def _size_along(model: Model, line: NDArray[np.float64]) -> float:

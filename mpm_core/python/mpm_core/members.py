@@ -13,9 +13,6 @@ from . import _core
 from ._core import InputError
 from .checks import flag, positive, real_numbers, within
 
-NO_COMPRESSION = 0.0
-"""Compressive strength of what buckles at once, such as a geogrid [N/m]"""
-
 
 @dataclass(frozen=True)
 class Member:
@@ -195,10 +192,10 @@ def _made(points: Any, axial_stiffness: float, **values: Any) -> Member:
         raise InputError(f"points is {points.tolist()}, expected points that differ from the one before")
     if "bending_stiffness" in values and points.shape[1] == 3:
         raise InputError("points has three dimensions, expected two: beams are for plane strain, bars and struts for both")
-    for name in {"tensile_strength", "compressive_strength", "plastic_moment", "bond_strength"}.intersection(values):
-        values[name] = within(name, values[name], 0.0, math.inf)
-    for name in {"fixed_end", "connected"}.intersection(values):
-        values[name] = bool(flag(name, values[name]))
+    for name in ("tensile_strength", "compressive_strength", "plastic_moment", "bond_strength"):
+        values[name] = within(name, values.get(name, math.inf), 0.0, math.inf)
+    for name in ("fixed_end", "connected"):
+        values[name] = bool(flag(name, values.get(name, False)))
     if values.get("spacing") is not None:
         values["spacing"] = float(positive("spacing", values["spacing"], "m"))
     values["free_length"] = within("free_length", values.get("free_length", 0.0), 0.0, float(edges[0]), open_above=True)

@@ -310,3 +310,11 @@ def test_a_stage_of_particles_after_members_were_taken_over_changes_nothing():
         site.carry_out(bridge.Stage("load", pressure={TOP: 10e3}))
     assert site.number == 1
     assert site.state.pressure == {}
+
+
+def test_an_axisymmetric_model_takes_no_members():
+    mesh = bridge.background_mesh(*bridge.box_mesh(COMM, (2.0, 2.0), (4, 4)))
+    model = mpm.Model(mesh, mpm.LinearElastic(young=1e6, poisson=0.2), geometry=mpm.Geometry.AXISYMMETRIC)
+    with pytest.raises(mpm.InputError, match="members in an axisymmetric model"):
+        model.install({"bar": mpm.bar([(0.5, 0.5), (1.5, 0.5)], 5e6)})
+    assert model.members == {}
