@@ -216,13 +216,13 @@ std::int64_t run_explicit(Model<G>& model, const ExplicitOptions& options, const
       if (run.conversion)
         convert_failing(model, *run.conversion);
       const double of_members = squared_frequency_of_members(model);
-      const double critical = critical_with_members(critical_time_step(model), of_members);
+      const double of_cells = critical_time_step(model), critical = critical_with_members(of_cells, of_members);
       const double of_soil = options.rayleigh.stiffness > 0
                                  ? critical_with_members(critical_time_step_of_soil(model), of_members)
                                  : critical;
       dt = next_step(model, run, damped_time_step(options.rayleigh, critical, of_soil));
       convert_near_surfaces(model, control_interval * dt);
-      of_step.pic_fraction = pic_fraction_of_step(run.pic, dt, critical);
+      of_step.pic_fraction = pic_fraction_of_step(run.pic, dt, of_cells); // stiff members must not brake the soil
     }
     of_step.renews_dashpots = done % control_interval == 0;
     explicit_step(model, of_step, dt);

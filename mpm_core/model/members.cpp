@@ -148,6 +148,10 @@ std::vector<Vector<D>> internal_forces(Member<D>& member)
 /// Sum of the weights of a node before they are made parts of it, below which it counts as not in soil.
 constexpr double least_filling = 0.05;
 
+/// Density at the nodes of a cell over that of the particles, below which nothing in the cell counts as in soil: single
+/// particles in the air neither carry a member nor shorten its steps.
+constexpr double least_density = 0.1;
+
 /// How far outside of the mesh a node may be, in shape functions of its last cell: by round-off a node at its boundary
 /// is.
 constexpr double most_outside = 0.5;
@@ -173,11 +177,23 @@ double weigh(const Model<G>& model, const VelocityField<G>& field, const Vector<
     host.weights[k] = largest > 0 ? std::max(0.0, shapes[k]) * densities[k] / largest : 0;
     sum += host.weights[k];
   }
-  if (sum < least_filling)
+  if (sum < least_filling || largest < least_density * model.largest_density)
     sum = 0;
   for (double& weight : host.weights)
     weight = sum > 0 ? weight / sum : 0;
   return largest * sum;
+}
+
+/// Largest density of a particle [kg/m^D].
+/// @note Collective
+template <class G>
+double largest_density(const Model<G>& model)
+{
+  double largest = 0;
+  for (Index p = 0; p < model.particles.size(); ++p)
+    largest = std::max(largest, model.particles.mass[p] / model.particles.volume[p]);
+  MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, model.exchange.comm);
+  return largest;
 }
 
 /// Volumes of the cells around the nodes [m^D].
@@ -194,12 +210,11 @@ void find_volumes_around(Model<G>& model)
 }
 
 /// Number on this rank of a cell that it owns; `none` of others.
-template <int D>
-Index own_number(const Mesh<D>& mesh, GlobalIndex cell)
+template <class G>
+Index own_number(const Model<G>& model, GlobalIndex cell)
 {
-  const auto end = mesh.global_cells.begin() + mesh.owned_cells;
-  const auto found = std::find(mesh.global_cells.begin(), end, cell);
-  return found == end ? none : static_cast<Index>(found - mesh.global_cells.begin());
+  const auto found = model.migration.owned_cells.find(cell);
+  return found == model.migration.owned_cells.end() ? none : found->second;
 }
 
 /// Cell of each node, by its number over all ranks: its last one where it has left the mesh by a little; `none` where
@@ -219,7 +234,7 @@ std::vector<GlobalIndex> cells_of_nodes(const Model<G>& model, const Member<D>& 
   MPI_Allreduce(MPI_IN_PLACE, cells.data(), count, MPI_INT64_T, MPI_MAX, model.exchange.comm);
   for (std::size_t k = 0; k < cells.size(); ++k)
   {
-    const Index last = cells[k] == none ? own_number<D>(model.mesh, member.cells[k]) : none;
+    const Index last = cells[k] == none ? own_number(model, member.cells[k]) : none;
     if (last == none)
       continue;
     const auto shapes = shape_functions<D>(model.mesh.shapes[last], member.positions[k]);
@@ -260,11 +275,11 @@ std::size_t leader_of(const Member<D>& member, std::size_t k)
   }
   return k;
 }
-/// Finds the cells of the nodes of all members.
-/// @throws RunError on all ranks, for a node outside of the mesh
+/// Finds the cells of the nodes of all members; one that has flowed out with the soil has none.
+/// @throws RunError on all ranks, for a node outside of the mesh where soil may not flow out, or all must be inside
 /// @note Collective
 template <class G>
-void find_hosts(Model<G>& model)
+void find_hosts(Model<G>& model, bool all_inside)
 {
   constexpr int D = G::dim;
   for (Member<D>& member : model.members)
@@ -272,7 +287,7 @@ void find_hosts(Model<G>& model)
     member.cells = cells_of_nodes(model, member);
     for (std::size_t k = 0; k < moving_nodes(member); ++k)
     {
-      if (member.cells[k] == none)
+      if (member.cells[k] == none && (all_inside || model.outflow_tags.empty()))
       {
         std::ostringstream out;
         out << "node " << k << " of the structural member '" << member.name << "' at (";
@@ -281,7 +296,7 @@ void find_hosts(Model<G>& model)
         out << ") m is outside of the background mesh";
         throw RunError(out.str());
       }
-      member.hosts[k].cell = own_number<D>(model.mesh, member.cells[k]);
+      member.hosts[k].cell = own_number(model, member.cells[k]);
     }
   }
 }
@@ -320,12 +335,13 @@ Member<D> make_member(std::string name, const MemberProperties& properties, std:
 }
 
 template <class G>
-void begin_members(Model<G>& model)
+void begin_members(Model<G>& model, bool all_inside)
 {
   if (model.members.empty())
     return;
   find_volumes_around(model);
-  find_hosts(model);
+  model.largest_density = largest_density(model);
+  find_hosts(model, all_inside);
 }
 
 template <class G>
@@ -404,7 +420,7 @@ void move_members(Model<G>& model, double dt)
     of_member += static_cast<std::ptrdiff_t>(moving);
   }
   if (any_left)
-    find_hosts(model);
+    find_hosts(model, false);
 }
 
 template <class G>
@@ -413,8 +429,9 @@ double squared_frequency_of_members(Model<G>& model)
   constexpr int D = G::dim;
   if (model.members.empty())
     return 0;
-  map_to_nodes(model); // masses of now, so that a run that goes on from a file takes the same steps
   VelocityField<G>& field = model.fields.front();
+  const auto sums_of_step = field.nodes; // with the forces of members, which reports show
+  map_to_nodes(model);                   // masses of now, so that a run that goes on from a file takes the same steps
   std::vector<Vector<D>>& sums = field.contact_force; // its first component, as scratch
   sums.resize(field.nodes.size());
   for (Member<D>& member : model.members)
@@ -455,6 +472,7 @@ double squared_frequency_of_members(Model<G>& model)
     largest = std::max(largest, sum[0]);
     sum = {};
   }
+  field.nodes = sums_of_step;
   MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, model.exchange.comm);
   return largest;
 }
@@ -465,7 +483,7 @@ double squared_frequency_of_members(Model<G>& model)
 INSTANTIATE_DIMENSION(2)
 INSTANTIATE_DIMENSION(3)
 #define INSTANTIATE(G)                                                                                                 \
-  template void begin_members(Model<G>&);                                                                              \
+  template void begin_members(Model<G>&, bool);                                                                        \
   template void add_member_forces(Model<G>&, VelocityField<G>&);                                                       \
   template void move_members(Model<G>&, double);                                                                       \
   template double squared_frequency_of_members(Model<G>&);

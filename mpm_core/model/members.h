@@ -16,12 +16,13 @@ template <int D>
 Member<D> make_member(std::string name, const MemberProperties& properties, std::vector<Vector<D>> positions,
                       std::vector<double> axial_force, std::vector<double> moments);
 
-/// Finds what members need of the mesh, after anything but a step has changed it: their cells, and the volumes of the
-/// cells around the nodes.
-/// @throws RunError on all ranks, for a node outside of the mesh
+/// Finds what members need of mesh and soil, after anything but a step has changed them: the cells of their nodes, the
+/// volumes of the cells around the nodes of the mesh, and the density of the soil.
+/// @param all_inside  whether no node may be outside of the mesh, also where soil may flow out
+/// @throws RunError on all ranks, for a node outside of a mesh that soil may not leave
 /// @note Collective where there are members
 template <class G>
-void begin_members(Model<G>& model);
+void begin_members(Model<G>& model, bool all_inside = false);
 
 /// Updates the forces in the members and adds them to the tractions at the nodes of a field.
 /// @pre sums of the field's nodes are there

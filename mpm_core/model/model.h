@@ -127,6 +127,7 @@ struct Model
   std::vector<FieldContact<D>> field_contacts; ///< of velocity fields among one another
   std::vector<Member<D>> members;              ///< structural ones, in explicit steps
   std::vector<double> volume_around;           ///< per node, of the cells around it; where there are members [m^D]
+  double largest_density = 0;                  ///< of the particles; where there are members [kg/m^D]
   std::optional<PoreWater> water;              ///< in the pores of the soil
   WaterField<G> water_field;                   ///< its motion, where it has its own; see `has_two_phases`
   std::vector<Index> outflow_tags;

@@ -69,7 +69,7 @@ void bind_members_of(py::module_& m)
           model.members.push_back(make_member<D>(name, properties_of(properties), positions, axial_force, moments));
           try
           {
-            begin_members(model);
+            begin_members(model, true);
           }
           catch (const RunError& error)
           {
