@@ -58,7 +58,7 @@ def reconfigure(
     _support(model, model.supports if supports is None else tuple(supports), there)
     space = model.displacement.function_space
     model._loads = LoadVectors(space, model.facet_tags, model.cell_tags, active=active, radius=model.radius)
-    model._members.change(prepared, model.displacement.x.array[: model._n_own])
+    model._change_members(prepared)
     model._water = water
     if water is not None:
         model._loads.constant = _seepage_forces(space, water, there, model.radius)

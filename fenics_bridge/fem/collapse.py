@@ -20,6 +20,7 @@ from fenics_bridge.fem.locking import warn_of_few_cells, warn_of_locking_at_fail
 from fenics_bridge.fem.mixed import MixedQuasiStatic
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.fem.strength import reduced_strength
+from fenics_bridge.mesh.names import names_of
 from fenics_bridge.types import Laws
 
 
@@ -134,6 +135,7 @@ def factor_of_safety(
             "particle_safety"
         )
     law = model.law
+    unreduced = _tags_of(model, law, unreduced)
     model.law = reduce(law, start, unreduced)
 
     def weaken(factor: float) -> Any:
@@ -149,6 +151,14 @@ def factor_of_safety(
         model.law = law
     model.converged = found.value >= 1.0
     return found
+
+
+def _tags_of(model: Any, law: Laws, unreduced: Collection[int | str]) -> Collection[int | str]:
+    """Names of soils as the tags by which the body has its laws: a site with stages has them by number."""
+    if not isinstance(law, dict) or isinstance(unreduced, (str, int)):
+        return unreduced
+    names = names_of(model.cell_tags)
+    return [number for tag in unreduced for number in ((tag,) if tag in law else names.get(str(tag), (tag,)))]
 
 
 def _not_carried(start: float, steps: list[LoadStep]) -> str:

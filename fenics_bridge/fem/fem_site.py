@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import Any
 
 import numpy as np
+from mpm_core.members import Member
 
 from fenics_bridge.compat import cell_dofs
 from fenics_bridge.errors import agree
-from fenics_bridge.fem.active_cells import switch_off
+from fenics_bridge.fem.active_cells import cells_there, switch_off
 from fenics_bridge.fem.load_steps import LoadStep
 from fenics_bridge.fem.loads import Load
 from fenics_bridge.fem.quasi_static import QuasiStatic
@@ -63,11 +64,12 @@ class FemSite:
             lambda given, argument: tag_numbers(comm, fem.facet_tags, given, argument),
             name_of=lambda tag: label(fem.cell_tags, tag),
             supports=fem.supports,
+            require_members=self._require_members,
         )
         """Which soils have been placed, their weights, loads and supports"""
+        self._every = set(known_tags(comm, fem.cell_tags))
         fem.give_laws_by_tag()
         switch_off(fem)
-        self._every = set(known_tags(comm, fem.cell_tags))
 
     def __repr__(self) -> str:
         return f"<FemSite: after stage {self.number}; {self.fem!r}>"
@@ -140,9 +142,19 @@ class FemSite:
         there = cell_dofs(space)[points.cells[points.material >= 0]].ravel()
         return max(self.fem.domain.comm.allgather(float(size[there].max(initial=0.0))))
 
+    def _off(self, there: Collection[int]) -> tuple[int, ...]:
+        """Tags of the soils that are not there."""
+        return tuple(sorted(self._every.difference(there)))
+
+    def _require_members(self, where: str, there: Collection[int], members: dict[str, Member]) -> None:
+        """Require that members are in the soils that are there. where: stage, for messages. Collective."""
+        off = self._off(there)
+        active = cells_there(self.fem.domain, self.fem.cell_tags, off) if off else None
+        self.fem.require_members(members, active, where)
+
     def _enter(self, state: SiteState, stress: OfPosition | None = None) -> Load:
         """Change the body to a state; returns the state's load, which does not act yet. stress: of soils that are placed."""
-        off = tuple(sorted(self._every.difference(state.there)))
+        off = self._off(state.there)
         self.fem.reconfigure(off, state.supports, state.pore_pressure, stress, self._laws(state), state.members)
         self.state = state
         moved = any(v for s in state.supports for v in (s.displacement or ()) if v)

@@ -38,6 +38,7 @@ from fenics_bridge.fem.solver import Solver, given_solver
 from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.mesh.names import known_tags
 from fenics_bridge.structures.installed import Members
+from fenics_bridge.structures.member_warnings import warn_of_members
 from fenics_bridge.types import Law, Laws, MeshTags, OfPosition
 from fenics_bridge.views import body_text, law_lines
 from mpm_core import Geometry
@@ -363,25 +364,40 @@ class QuasiStatic(SupportedBody, PointFunctions):
         warn_of_motion(self)
         return steps
 
-    def _prepared_members(self, members: dict[str, Member], active: Any) -> Any:
+    def require_members(self, members: dict[str, Member], active: Any, where: str = "") -> None:
+        """Require that members suit the body and are in soil that is there. Collective.
+
+        Args:
+            members: members by name.
+            active: function that is 1 in the cells that are there and 0 in others; None where all are.
+            where: what begins the message.
+
+        Raises:
+            InputError: a member of another dimension, in an axisymmetric body, or in no soil. Raised on all ranks alike.
+        """
+        self._prepared_members(members, active, where)
+
+    def _prepared_members(self, members: dict[str, Member], active: Any, where: str = "") -> Any:
         """Members for `Members.change`, in the cells where a function is 1; raises InputError before anything changes. Collective."""
         comm, dim = self.domain.comm, self.domain.geometry.dim
-        if members:
-            other = next((name for name, member in members.items() if member.dim != dim), None)
-            agree(comm, f"members: {other!r} has {members[other].dim} dimensions, expected {dim}" if other else None)
+        other = next((name for name, member in members.items() if member.dim != dim), None)
+        wrong = None if other is None else f"{other!r} has {members[other].dim} dimensions, expected {dim}"
+        if members and self.radius is not None:
+            wrong = "there are some in an axisymmetric body, expected plane strain or three dimensions"
+        if members and self._nmd and not self._body.solver.direct:
             wrong = (
-                "members in an axisymmetric body, expected plane strain or three dimensions" if self.radius else None
+                f"there are some with nmd=True in more than {AVERAGED_LIMIT} nodes of three dimensions, expected degree=2, or the "
+                f"option -{self._options_prefix}pc_type lu"
             )
-            agree(comm, wrong)
-            factored = self._nmd and not self._body.solver.direct
-            agree(
-                comm,
-                f"members with nmd=True in more than {AVERAGED_LIMIT} nodes of three dimensions, expected degree=2, or the option "
-                f"-{self._options_prefix}pc_type lu"
-                if factored
-                else None,
-            )
-        return self._members.prepared(members, active)
+        agree(comm, wrong and f"{where}members: {wrong}")
+        return self._members.prepared(members, active, where)
+
+    def _change_members(self, prepared: Any) -> None:
+        """Install, keep and remove members that were prepared. Collective."""
+        before = set(self._members)
+        self._members.change(prepared, self.displacement.x.array[: self._n_own])
+        held = self._body.constraints.dofs
+        warn_of_members(self._members, held[held < self._n_own], before, self.domain.comm)
 
     def _internal_forces(self) -> NDArray[np.float64]:
         """Nodal forces of the present stresses, and of the members. Collective."""

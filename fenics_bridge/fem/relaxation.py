@@ -150,8 +150,10 @@ def relax(
             result.outcome = "failure"
             result.reason = (
                 f"a mechanism: the displacement grew by {result.growth[-1]:.3g} m at a steady rate under an out-of-balance "
-                f"force of {result.residual[-1]:.1e}; the stresses carry {result.carried[-1]:.2%} of the load"
+                f"force of {result.residual[-1]:.1e}"
             )
+            if not np.isnan(result.carried[-1]):  # as where a prestress moves the soil against the load
+                result.reason += f"; the stresses carry {result.carried[-1]:.2%} of the load"
             return result
         theta *= NEXT_THETA[len(residuals) - 2]
     last = result.residual[-1] if result.residual else np.inf

@@ -183,6 +183,8 @@ class SiteState:
         facets_of: the same for boundaries.
         name_of: function of a soil's tag that gives its name for messages.
         supports: boundary conditions at the start.
+        require_members: function of a stage's name for messages, tags that are there and members by name, which raises where a member is
+            in no soil.
     """
 
     def __init__(
@@ -192,8 +194,10 @@ class SiteState:
         facets_of: Callable[[Any, str], Sequence[int]],
         name_of: Callable[[int], str],
         supports: Sequence[Support] = (),
+        require_members: Callable[[str, Sequence[int], dict[str, Member]], None] | None = None,
     ) -> None:
         self._comm, self._cells_of, self._facets_of, self._name_of = comm, cells_of, facets_of, name_of
+        self._require_members = require_members
         self.there: tuple[int, ...] = ()
         """Tags of the soils that are there"""
         self.law: dict = {}
@@ -244,6 +248,8 @@ class SiteState:
         new.pressure = {tag: p for tag, p in (self.pressure | pressure).items() if p != 0}
         new.supports = self._supports_after(stage, where)
         new.members = {name: one for name, one in self.members.items() if name not in stage.remove} | stage.install
+        if new.members and self._require_members is not None:
+            self._require_members(where, new.there, new.members)
         if stage.pore_pressure is not None:
             new.pore_pressure = stage.pore_pressure
         return new, fill, excavate

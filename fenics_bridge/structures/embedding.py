@@ -30,7 +30,7 @@ class Embedding:
         space: Lagrange space of displacements.
         points: positions (n, D) [m], the same on all ranks.
         active: function that is 1 in cells that are there and 0 in others; None where all are.
-        owners: name of the member of each point, for the message.
+        owners: what each point belongs to, for the message.
 
     Raises:
         InputError: a point is in no active cell. Raised on all ranks alike.
@@ -51,7 +51,7 @@ class Embedding:
             where = ", ".join(f"{x:.6g}" for x in points[lost[0]])
             agree(
                 domain.comm,
-                f"the member {owners[lost[0]]!r}: the point ({where}) m is in no soil that is there, expected points in the soil",
+                f"{owners[lost[0]]}: the point ({where}) m is in no soil that is there, expected points in the soil",
             )
         back = np.argsort(order)
         self.nodes = np.concatenate([each for _, each, _ in found])[back]

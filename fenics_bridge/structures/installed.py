@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from mpm_core.members import Member, MemberForces, member_strains
+from mpm_core.members import Member, MemberForces
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
@@ -25,10 +25,12 @@ class _Installed:
     member: Member
     nodes: NDArray[np.float64]
     segments: int
+    bends_at: tuple[tuple[int, ...], ...]
+    """Nodes at which it bends, of each moment"""
     lengths: NDArray[np.float64]
     """Length over which each strain acts [m], (k,)"""
     force: NDArray[np.float64]
-    """Axial force of each segment [N], then moment at each inner node [N m], (k,)"""
+    """Axial force of each segment [N], then moment where it bends [N m], (k,)"""
     origin: Any
     """Displacement of the nodes at the installation [m], (n, D); None before it"""
     stressing: bool
@@ -59,6 +61,13 @@ class _Installed:
         slipping = slip_tangent(force[:n], (least[:n], largest[:n]), bond, self.lengths[:n])
         return force, sparse.block_diag([stiffness[:n, None] * slipping, tangent.tocsr()[n:, n:]])
 
+    def places(self) -> Any:
+        """1 where a force may depend on a strain, otherwise 0: (k, k). In a bar that slips all may depend on all."""
+        places = np.eye(len(self.lengths))
+        if np.isfinite(self.member.bond_strength):
+            places[: self.segments, : self.segments] = 1.0
+        return places
+
     def unstrained(self) -> NDArray[np.float64]:
         """Forces without strain: the prestress."""
         return np.where(self._is_axial(), self.member.prestress, 0.0)
@@ -87,6 +96,7 @@ class Members:
         self._trial: NDArray[np.float64] = np.zeros(0)
         self._tangent: Any = None  # derivatives of the forces by the strains
         self._strains: Any = None
+        self._places: Any = None  # 1 where a force may depend on a strain
 
     def __bool__(self) -> bool:
         return bool(self._there)
@@ -94,17 +104,22 @@ class Members:
     def __iter__(self) -> Iterator[str]:
         return iter(self._there)
 
+    def installed(self) -> Iterator[tuple[str, _Installed]]:
+        """The members with what they carry, by name."""
+        return iter(self._there.items())
+
     @property
     def given(self) -> dict[str, Member]:
         """The members by name."""
         return {name: one.member for name, one in self._there.items()}
 
-    def prepared(self, members: dict[str, Member], active: Any) -> dict[str, _Installed]:
+    def prepared(self, members: dict[str, Member], active: Any, where: str = "") -> dict[str, _Installed]:
         """These members for `change`: those that are there with what they carry, and new ones. Changes nothing. Collective.
 
         Args:
             members: the members that are there from now on.
             active: function that is 1 in the cells that are there and 0 in others; None where all are.
+            where: what begins a message.
 
         Raises:
             InputError: a node of a member is in no soil that is there. Raised on all ranks alike.
@@ -114,7 +129,7 @@ class Members:
         sizes = cell_sizes_along(self._space.mesh, [np.array(members[name].points) for name in new])
         installed = {name: self._installed(members[name], size) for name, size in zip(new, sizes)}
         there = {name: replace(kept[name]) if name in kept else installed[name] for name in members}
-        self._embed(there, active)
+        self._embed(there, active, where)
         return there
 
     def change(self, prepared: dict[str, _Installed], displacement: NDArray[np.float64]) -> None:
@@ -131,6 +146,7 @@ class Members:
             else:
                 one.stressing = False
         self._strains = sparse.vstack([one.strain for one in prepared.values()]).tocsr() if prepared else None
+        self._places = sparse.block_diag([one.places() for one in prepared.values()]) if prepared else None
         self.back()
 
     def lock_off(self) -> None:
@@ -176,22 +192,33 @@ class Members:
     def with_stiffness(self, matrix: PETSc.Mat, held: NDArray[np.integer]) -> PETSc.Mat:
         """A matrix of the soil with the members' stiffness, without rows and columns of the supports. Collective.
 
+        Its entries are at the same places for any stiffness.
+
         Args:
             matrix: stiffness of the soil; it stays as it is.
             held: this rank's own dofs that supports prescribe.
         """
-        free = np.ones(self._n_own)
-        free[held] = 0.0
-        free = np.concatenate(self._comm.allgather(free))
-        of_all = self._strains @ sparse.diags(free)
-        own = (self._own(of_all).T @ sparse.diags(self._lengths()) @ self._tangent @ of_all).tocsr()
-        own.sort_indices()
-        size = (self._n_own, self._n)
-        parts = own.indptr.astype(np.int32), own.indices.astype(np.int32), own.data
-        ours = PETSc.Mat().createAIJ((size, size), csr=parts, comm=self._comm)
+        of_all = self._strains @ sparse.diags(1 - self.of_all_ranks(held))
+        stiffness = self._own(of_all).T @ sparse.diags(self._lengths()) @ self._tangent @ of_all
+        # Products leave out zeros, as of what yields, but the solver adds matrices to one another whose entries are at the same places.
+        places = self._own(abs(self._strains)).T @ self._places @ abs(self._strains)
         both = matrix.copy()
-        both.axpy(1.0, ours, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        both.axpy(1.0, self._matrix(0.0 * places), PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        both.axpy(1.0, self._matrix(stiffness), PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         return both
+
+    def of_all_ranks(self, dofs: NDArray[np.integer]) -> NDArray[np.float64]:
+        """For each dof of all ranks, 1 where it is among some of this rank's own ones on any of them, otherwise 0. Collective."""
+        mine = np.zeros(self._n_own)
+        mine[dofs] = 1.0
+        return np.concatenate(self._comm.allgather(mine))
+
+    def _matrix(self, rows: Any) -> PETSc.Mat:
+        """A matrix of PETSc from this rank's own rows. Collective."""
+        own, size = rows.tocsr(), (self._n_own, self._n)
+        own.sort_indices()
+        parts = own.indptr.astype(np.int32), own.indices.astype(np.int32), own.data
+        return PETSc.Mat().createAIJ((size, size), csr=parts, comm=self._comm)
 
     def result(self, name: str, displacement: NDArray[np.float64]) -> MemberForces:
         """Forces of a member in the last step accepted. Collective.
@@ -202,8 +229,8 @@ class Members:
         """
         one = self._there[name]
         moment = np.zeros(len(one.nodes))
-        if len(one.force) > one.segments:
-            moment[1:-1] = one.force[one.segments :]
+        for at, value in zip(one.bends_at, one.force[one.segments :]):
+            moment[list(at)] = value
         moved = self._moved(one, displacement) - one.origin
         return MemberForces(one.nodes, moved, one.force[: one.segments].copy(), moment)
 
@@ -216,21 +243,27 @@ class Members:
         """
         return self._moved(self._there[name], displacement)
 
+    def node_distance(self, line: NDArray[np.float64]) -> float:
+        """About the distance of the body's nodes along a line (k, D) [m]; 0 where the line is outside of the mesh. Collective."""
+        return cell_sizes_along(self._space.mesh, [line])[0] / min(2, compat.degree_of(self._space))
+
     def _installed(self, member: Member, size: float) -> _Installed:
         """A member without any strain; size: of the cells around it [m]."""
         nodes = member.nodes(size / min(2, compat.degree_of(self._space)) or member.length)
-        strains = member_strains(nodes, member.bending_stiffness > 0)
-        lengths = strains.lengths
-        one = _Installed(member, nodes, strains.segments, lengths, np.zeros(0), None, member.prestress != 0)
+        strains = member.strains(nodes)
+        one = _Installed(
+            member, nodes, strains.segments, strains.bends_at, strains.lengths, np.zeros(0), None, member.prestress != 0
+        )
         one.force = one.unstrained()
         return one
 
-    def _embed(self, there: dict[str, _Installed], active: Any) -> None:
-        """Find the cells around the nodes of members, all in one search."""
+    def _embed(self, there: dict[str, _Installed], active: Any, where: str) -> None:
+        """Find the cells around the nodes of members, all in one search; where: what begins a message."""
         moving = [one.nodes[:-1] if one.member.fixed_end else one.nodes for one in there.values()]
         if not moving:
             return
-        owners = [name for name, nodes in zip(there, moving) for _ in nodes]
+        names = [where + _named(name, one.member) for name, one in there.items()]
+        owners = [name for name, nodes in zip(names, moving) for _ in nodes]
         embedding = Embedding(self._space, np.concatenate(moving), active, owners)
         start = 0
         for one, nodes in zip(there.values(), moving):
@@ -248,7 +281,7 @@ class Members:
         )
         values = np.broadcast_to(weights[:, None, :], rows.shape)
         one.movement = sparse.csr_matrix((values.ravel(), (rows.ravel(), columns)), (count * dim, self._n))
-        operator = member_strains(one.nodes, one.member.bending_stiffness > 0).operator
+        operator = one.member.strains(one.nodes).operator
         one.strain = sparse.csr_matrix(operator.reshape(len(operator), -1)) @ one.movement
 
     def _own(self, matrix: Any) -> Any:
@@ -289,3 +322,12 @@ class Members:
         for one in self._there.values():
             yield one, values[start : start + len(one.lengths)]
             start += len(one.lengths)
+
+
+def _named(name: str, member: Member) -> str:
+    """A member as messages name it."""
+    return (
+        f"the member {name!r}, whose last point is the one that is held in space"
+        if member.fixed_end
+        else f"the member {name!r}"
+    )

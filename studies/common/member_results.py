@@ -54,17 +54,24 @@ def moment_column(member: str) -> str:
     return f"{member.replace(' ', '_')}_moment_N_m_per_m"
 
 
+def shear_column(member: str) -> str:
+    """Name of the column of a beam's shear force."""
+    return f"{member.replace(' ', '_')}_shear_force_N_per_m"
+
+
 def force_columns(members: Mapping[str, mpm.Member]) -> list[str]:
     """Names of the columns of `force_row`."""
     bending = [moment_column(name) for name, member in members.items() if member.bending_stiffness]
-    return [*map(axial_column, members), *bending]
+    shear = [shear_column(name) for name, member in members.items() if member.bending_stiffness]
+    return [*map(axial_column, members), *bending, *shear]
 
 
 def force_row(members: Mapping[str, mpm.Member], forces: Mapping[str, mpm.MemberForces]) -> dict[str, float]:
-    """Axial force of each member, and moment of each beam, where they are largest, for a table."""
+    """Axial force of each member, and moment and shear force of each beam, where they are largest, for a table."""
     axial = {axial_column(name): largest(one.axial_force) for name, one in forces.items()}
-    bending = [name for name in forces if members[name].bending_stiffness]
-    return axial | {moment_column(name): largest(forces[name].moment) for name in bending}
+    beams = {name: one for name, one in forces.items() if members[name].bending_stiffness}
+    moments = {moment_column(name): largest(one.moment) for name, one in beams.items()}
+    return axial | moments | {shear_column(name): largest(one.shear_force) for name, one in beams.items()}
 
 
 def largest(values: np.ndarray) -> float:

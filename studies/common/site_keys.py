@@ -121,7 +121,7 @@ def _require_member(given: Any, where: str) -> None:
     kind = given.get("kind") if isinstance(given, dict) else None
     if kind not in MEMBERS:
         raise mpm.InputError(f"{where}: kind is {kind!r}, expected one of {', '.join(map(repr, MEMBERS))}")
-    arguments = [name for name in signature(MEMBERS[kind]).parameters if name not in ("start", "end")]
+    arguments = [name for name in signature(MEMBERS[kind]).parameters if name not in ("start", "end", "points")]
     _require_known(given, ("kind", "points", *arguments), where)
 
 

@@ -1,5 +1,7 @@
 """Structural members in finite elements are the same on 1, 2 and 3 ranks."""
 
+import warnings
+
 import numpy as np
 from mpi4py import MPI
 
@@ -96,3 +98,18 @@ def test_a_new_partition_does_not_change_what_members_carry():
     alone, _ = sliding(MPI.COMM_SELF)
     together, _ = sliding(COMM, rebalance=1.01)
     require_same(together, alone)
+
+
+def test_a_member_in_no_soil_is_said_once_and_one_across_ranks_is_not():
+    domain, cell_tags, facet_tags = bridge.box_mesh(COMM, (6.0, 3.0), (24, 12), body=((0.0, 0.0), (6.0, 1.0)))
+    model = mpm.Model(bridge.background_mesh(domain, cell_tags, facet_tags), mpm.LinearElastic(young=1e6, poisson=0.2))
+    model.seed(density=2000.0, per_cell=3, cell_tag=bridge.BODY)
+    model.fix(3)
+    model.set_gravity((0.0, -10.0))
+    model.install({"long": mpm.bar([(0.1, 1.0), (5.9, 0.9)], 5e6), "up": mpm.bar([(0.1, 2.0), (5.9, 2.0)], 5e6)})
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        model.explicit(until=1e-3).last()
+    said = [str(one.message) for one in found if "carries nothing" in str(one.message)]
+    assert len(said) == (1 if COMM.rank == 0 else 0)
+    assert all("'up'" in text for text in said)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, cast
 
@@ -13,6 +14,7 @@ from . import _core
 from ._core import InputError
 from .collective import collectively
 from .mesh import cell_sizes
+from .member_warnings import odd_units, rigid_beam, rigid_fraction
 from .members import Member, MemberForces, of_members
 
 if TYPE_CHECKING:
@@ -43,7 +45,7 @@ class MemberMethods:
                 points, with its prestress.
 
         Raises:
-            InputError: a member of another dimension, a beam in three dimensions, a name that is there already, or a point outside
+            InputError: a member of another dimension, a closed or clamped beam, a beam in three dimensions, a name that is there already, or a point outside
                 of the mesh. Raised on all ranks alike.
         """
         model, known = cast("Model", self), forces or {}
@@ -68,6 +70,10 @@ class MemberMethods:
             of_core = name, _properties(member), positions, axial, moment[1:-1] if bends else np.zeros(0)
             _core.install_member(model._core, *of_core)
             self._members[name] = {"member": _entry(member), "positions": positions.tolist()}
+            rigid = rigid_beam(name, rigid_fraction(model, positions), "cells") if bends else ""
+            for text in filter(None, (rigid, *odd_units(name, member))):
+                if model.comm.rank == 0:
+                    warnings.warn(text, RuntimeWarning, stacklevel=2)
 
     @property
     def members(self) -> dict[str, Member]:
@@ -125,6 +131,11 @@ def _require_members(model: Model, members: dict[str, Member], forces: dict[str,
             raise InputError(f"members: {name!r} is installed already")
         if member.dim != model.mesh.dim:
             raise InputError(f"members: {name!r} has {member.dim} dimensions, expected {model.mesh.dim}")
+        kind = "closed" if member.closed and member.bending_stiffness else "clamped"
+        if kind == "closed" or member.clamped_start or member.clamped_end:
+            raise InputError(
+                f"members: {name!r} is {kind}, expected a beam with free ends: among particles beams have these only"
+            )
     unknown = next((name for name in forces if name not in members), None)
     if unknown is not None:
         raise InputError(f"forces has {unknown!r}, expected names of members: {list(members)}")

@@ -13,6 +13,9 @@ from . import _core
 from ._core import InputError
 from .checks import flag, positive, real_numbers, within
 
+CLOSED = 1e-6
+"""Distance of the last point of a closed line from its first, over its length, at most: corners of a circle are rounded"""
+
 
 @dataclass(frozen=True)
 class Member:
@@ -48,6 +51,10 @@ class Member:
     """Whether its last point is held in space"""
     spacing: float | None = None
     """Length of the segments into which it is divided [m]; None for a length that suits the cells"""
+    clamped_start: bool = False
+    """Whether a beam cannot turn at its first point, as on an axis of symmetry"""
+    clamped_end: bool = False
+    """Whether a beam cannot turn at its last point"""
 
     @property
     def dim(self) -> int:
@@ -58,6 +65,16 @@ class Member:
     def length(self) -> float:
         """Length of the line [m]."""
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+    @property
+    def closed(self) -> bool:
+        """Whether its last point is its first, as in the lining of a tunnel."""
+        return len(self.points) > 2 and math.dist(self.points[0], self.points[-1]) <= CLOSED * self.length
+
+    def strains(self, nodes: NDArray[np.float64]) -> MemberStrains:
+        """Its strains by the displacements of its nodes (n, D) [m]."""
+        clamped = self.clamped_start, self.clamped_end
+        return member_strains(nodes, self.bending_stiffness > 0, self.closed, clamped)
 
     def nodes(self, spacing: float) -> NDArray[np.float64]:
         """Positions (n, D) [m] that divide the line into equal segments between its corners.
@@ -157,11 +174,14 @@ def beam(
     plastic_moment: float = math.inf,
     bond_strength: float = math.inf,
     spacing: float | None = None,
+    clamped_start: bool = False,
+    clamped_end: bool = False,
 ) -> Member:
     """A beam that bends with the soil: a sheet-pile or diaphragm wall, a row of piles, the lining of a tunnel. Plane strain only.
 
-    Its ends are free of moments. Shear strains are left out (Euler and Bernoulli). It slips along the soil where the force between both
-    exceeds the strength of their bond, but does not part from it.
+    Its ends are free of moments unless they are clamped. A line whose last point is its first is a ring, which bends there as
+    elsewhere. Shear strains are left out (Euler and Bernoulli). It slips along the soil where the force between both exceeds the
+    strength of their bond, but does not part from it.
 
     Args:
         points: two or more points of its line [m], shape (k, 2).
@@ -170,6 +190,9 @@ def beam(
         plastic_moment: largest bending moment [N m/m], at which a plastic hinge forms; by default it stays elastic.
         bond_strength: largest force between both sides of the beam and the soil per length of the beam [N/m2].
         spacing: length of the segments into which it is divided [m]; by default about the distance of the nodes around it.
+        clamped_start: whether it cannot turn at its first point: where a raft or a lining is cut by an axis of symmetry. Clamped ends
+            are for finite elements.
+        clamped_end: whether it cannot turn at its last point.
 
     Raises:
         InputError: a value is out of range.
@@ -179,7 +202,7 @@ def beam(
     """
     bending_stiffness = float(positive("bending_stiffness", bending_stiffness, "N m2/m"))
     return _made(points, axial_stiffness, bending_stiffness=bending_stiffness, plastic_moment=plastic_moment,
-                 bond_strength=bond_strength, spacing=spacing)  # fmt: skip
+                 bond_strength=bond_strength, spacing=spacing, clamped_start=clamped_start, clamped_end=clamped_end)  # fmt: skip
 
 
 def _made(points: Any, axial_stiffness: float, **values: Any) -> Member:
@@ -191,10 +214,12 @@ def _made(points: Any, axial_stiffness: float, **values: Any) -> Member:
     if np.any(edges == 0):
         raise InputError(f"points is {points.tolist()}, expected points that differ from the one before")
     if "bending_stiffness" in values and points.shape[1] == 3:
-        raise InputError("points has three dimensions, expected two: beams are for plane strain, bars and struts for both")
+        raise InputError(
+            "points has three dimensions, expected two: beams are for plane strain, bars and struts for both"
+        )
     for name in ("tensile_strength", "compressive_strength", "plastic_moment", "bond_strength"):
         values[name] = within(name, values.get(name, math.inf), 0.0, math.inf)
-    for name in ("fixed_end", "connected"):
+    for name in ("fixed_end", "connected", "clamped_start", "clamped_end"):
         values[name] = bool(flag(name, values.get(name, False)))
     if values.get("spacing") is not None:
         values["spacing"] = float(positive("spacing", values["spacing"], "m"))
@@ -202,10 +227,14 @@ def _made(points: Any, axial_stiffness: float, **values: Any) -> Member:
     stiffness = float(positive("axial_stiffness", axial_stiffness, "N/m"))
     member = Member(tuple(map(tuple, points.tolist())), stiffness, **values)
     if member.tensile_strength == member.compressive_strength == 0:
-        raise InputError("tensile_strength and compressive_strength are 0, expected one above it: the member carries nothing")
+        raise InputError(
+            "tensile_strength and compressive_strength are 0, expected one above it: the member carries nothing"
+        )
     prestress = within("prestress", member.prestress, -member.compressive_strength, member.tensile_strength)
     if math.isinf(prestress):
         raise InputError(f"prestress is {prestress}, expected a finite number")
+    if member.closed and (member.clamped_start or member.clamped_end):
+        raise InputError("clamped_start or clamped_end of a line whose last point is its first, expected an open line")
     return replace(member, prestress=prestress)
 
 
@@ -213,9 +242,9 @@ def _made(points: Any, axial_stiffness: float, **values: Any) -> Member:
 class MemberStrains:
     """Linear operators from the displacements of a member's nodes to its strains, small rotations.
 
-    Strains are those of its segments, followed by the curvatures at its inner nodes where it bends: the change of direction there
-    over half the length of the two segments beside it (a chain of stiff segments with springs between them, which converges to the
-    beam of Euler and Bernoulli with the square of the segments' length).
+    Strains are those of its segments, followed by curvatures where it bends, at its inner nodes and then at its ends if these bend:
+    the change of direction there over half the length of the two segments beside it (a chain of stiff segments with springs between
+    them, which converges to the beam of Euler and Bernoulli with the square of the segments' length).
     """
 
     operator: NDArray[np.float64]
@@ -224,14 +253,20 @@ class MemberStrains:
     """Length over which each strain acts [m], shape (k,)"""
     segments: int
     """Number of segments, whose axial strains come first"""
+    bends_at: tuple[tuple[int, ...], ...]
+    """Nodes of each curvature: one, or both ends of a ring"""
 
 
-def member_strains(nodes: NDArray[np.float64], bends: bool) -> MemberStrains:
+def member_strains(
+    nodes: NDArray[np.float64], bends: bool, closed: bool = False, clamped: tuple[bool, bool] = (False, False)
+) -> MemberStrains:
     """The strains of a chain of nodes.
 
     Args:
         nodes: positions (n, D) [m].
         bends: whether there are curvatures.
+        closed: whether the last node is where the first is, and the chain bends there.
+        clamped: whether the chain cannot turn at its first and at its last node.
     """
     n, dim = nodes.shape
     edges = np.diff(nodes, axis=0)
@@ -241,15 +276,26 @@ def member_strains(nodes: NDArray[np.float64], bends: bool) -> MemberStrains:
     rows = np.arange(n - 1)
     axial[rows, rows] = -along / lengths[:, None]
     axial[rows, rows + 1] = along / lengths[:, None]
-    if not bends or n < 3:
-        return MemberStrains(axial, lengths, n - 1)
+    if not bends:
+        return MemberStrains(axial, lengths, n - 1, ())
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     rotation = np.zeros((n - 1, n, dim))
     rotation[rows, rows] = -across / lengths[:, None]
     rotation[rows, rows + 1] = across / lengths[:, None]
-    halves = (lengths[1:] + lengths[:-1]) / 2
-    curvature = np.diff(rotation, axis=0) / halves[:, None, None]
-    return MemberStrains(np.concatenate([axial, curvature]), np.concatenate([lengths, halves]), n - 1)
+    turns, halves = list(np.diff(rotation, axis=0)), list((lengths[1:] + lengths[:-1]) / 2)
+    bends_at: list[tuple[int, ...]] = [(k,) for k in range(1, n - 1)]
+    if closed:
+        turns.append(rotation[0] - rotation[-1])
+        halves.append((lengths[0] + lengths[-1]) / 2)
+        bends_at.append((0, n - 1))
+    # A clamped end is the middle of two segments that mirror one another: it turns by twice the angle of one over its length.
+    for end, sign, segment in ((0, 1.0, 0), (n - 1, -1.0, -1)):
+        if clamped[0 if end == 0 else 1]:
+            turns.append(sign * rotation[segment])
+            halves.append(lengths[segment] / 2)
+            bends_at.append((end,))
+    curvature = np.reshape([turn / half for turn, half in zip(turns, halves)], (-1, n, dim))
+    return MemberStrains(np.concatenate([axial, curvature]), np.append(lengths, halves), n - 1, tuple(bends_at))
 
 
 @dataclass(frozen=True)
@@ -263,7 +309,7 @@ class MemberForces:
     axial_force: NDArray[np.float64]
     """Axial force of each segment [N/m], tension positive, shape (n - 1,)"""
     moment: NDArray[np.float64]
-    """Bending moment at the nodes [N m/m], 0 at the ends, shape (n,); positive where its left side, seen along its line, is compressed"""
+    """Bending moment at the nodes [N m/m], 0 at free ends, shape (n,); positive where its left side, seen along its line, is compressed"""
 
     @property
     def bends(self) -> bool:

@@ -12,6 +12,7 @@ from .boundary_warnings import doubts_of_boundaries
 from .drainage_warnings import undrained_border
 from .input_warnings import UNIT_WEIGHTS
 from .law_warnings import doubts_of_laws
+from .member_warnings import members_in_air
 from .water_checks import undrained_friction
 
 if TYPE_CHECKING:
@@ -32,7 +33,10 @@ def warn_of_setup(model: Model, nmd: bool, damping: float = 0.0, until: float = 
     of_loads = _nothing_acts(model), _nothing_holds(model), _upwards(model), _weight(model) or _softness(model)
     of_laws, of_boundaries = doubts_of_laws(model, nmd), doubts_of_boundaries(model, damping)
     of_water = _tilted_water(model), undrained_friction(model, until), undrained_border(model)
-    found = [text for text in (*of_loads, *of_laws, *of_boundaries, *of_water) if text]
+    of_members = members_in_air(
+        model, {name: (forces := model.member_forces(name)).positions + forces.displacement for name in model.members}
+    )
+    found = [text for text in (*of_loads, *of_laws, *of_boundaries, *of_water, of_members) if text]
     if model.comm.rank == 0:
         for text in found:
             warnings.warn(text, RuntimeWarning, stacklevel=3)
@@ -55,6 +59,7 @@ def _nothing_acts(model: Model) -> str:
 
 def _nothing_holds(model: Model) -> str:
     held = model._conditions or model._contacts or model._absorbing or model._border is not None
+    held = held or any(member.fixed_end for member in model.members.values())
     if held or not np.any(model.gravity):
         return ""
     return "nothing holds the particles, which fall freely: there is gravity and no boundary condition (model.fix, model.roller)"

@@ -221,6 +221,22 @@ def test_the_factor_of_safety_leaves_the_strength_of_members_as_it_is():
     assert found.value == pytest.approx(10e3 / (traction - strength / 6.0), rel=0.015)
 
 
+def test_the_stiffness_has_its_entries_at_the_same_places_where_members_yield():
+    """The solver adds a part of its first matrix to tangents that are singular, entry by entry (it crashed in a nailed cut)."""
+    fem = body((2.0, 1.0), (8, 4), mpm.LinearElastic(young=1e6, poisson=0.2), [bridge.fixed(BOTTOM)])
+    nail = mpm.bar([(0.3, 0.6), (1.7, 0.4)], 1e6, tensile_strength=1e3)
+    fem.reconfigure(members={"nail": nail, "tie": mpm.strut((0.3, 0.8), (1.7, 0.9), 1e6, tensile_strength=1e3)})
+    members, kinematics = fem._members, fem._kinematics
+    kinematics.strain_increment()
+    soil, held = kinematics.stiffness(), np.zeros(0, dtype=int)
+    elastic = members.with_stiffness(soil, held)
+    members._tangent = 0.0 * members._tangent
+    yielding = members.with_stiffness(soil, held)
+    for one, other in zip(elastic.getValuesCSR()[:2], yielding.getValuesCSR()[:2]):
+        assert np.array_equal(one, other)
+    assert elastic.norm() > yielding.norm()
+
+
 def test_a_geogrid_carries_no_compression():
     supports = [bridge.roller(BOTTOM, (0, 1)), bridge.roller(LEFT, (1, 0)), bridge.prescribed(TOP, (None, -0.01))]
     fem = body((1.0, 2.0), (4, 8), mpm.LinearElastic(young=1e6, poisson=0.0), supports)
@@ -350,3 +366,58 @@ def test_a_stage_that_digs_soil_away_from_a_member_changes_nothing():
     assert tuple(fem.off) == ()
     site.carry_out(bridge.Stage("nothing"))
     assert np.allclose(fem.points.stress, stress, atol=1e-6 * np.abs(stress).max())
+
+
+def test_stages_find_members_in_no_soil_before_anything_is_computed():
+    domain, _, facet_tags = bridge.box_mesh(COMM, (2.0, 2.0), (8, 8))
+    cells = np.arange(bridge.original_cells(domain).size, dtype=np.int32)
+    height = compute_midpoints(domain, 2, cells)[:, 1]
+    cell_tags = meshtags(domain, 2, cells, np.where(height < 1, 1, 2).astype(np.int32))
+    fem = bridge.QuasiStatic(
+        domain, mpm.LinearElastic(young=1e6, poisson=0.0), facet_tags, [bridge.fixed(BOTTOM)], cell_tags=cell_tags
+    )
+    site, weight = bridge.FemSite(fem), {1: 20e3, 2: 20e3}
+    nail, strut = mpm.bar([(0.2, 1.5), (1.8, 1.5)], 1e6), mpm.strut((-3.0, 0.5), (1.0, 0.5), 1e6, fixed_end=True)
+    early = [bridge.Stage("base", fill=1, unit_weight=weight, install={"nail": nail}), bridge.Stage("top", fill=2)]
+    dug = [
+        bridge.Stage("all", fill=[1, 2], unit_weight=weight, install={"nail": nail}),
+        bridge.Stage("dig", excavate=2),
+    ]
+    turned = [bridge.Stage("all", fill=[1, 2], unit_weight=weight, install={"strut": strut})]
+    for stages, message in (
+        (early, r"stage 'base': the member 'nail': the point \(0.2, 1.5\) m is in no soil"),
+        (dug, r"stage 'dig': the member 'nail': the point \(0.2, 1.5\) m is in no soil"),
+        (
+            turned,
+            r"stage 'all': the member 'strut', whose last point is the one that is held in space: the point \(-3, 0.5\) m",
+        ),
+    ):
+        with pytest.raises(mpm.InputError, match=message):
+            list(bridge.carry_out(site, stages))
+        assert site.number == 0 and site.state.there == () and fem.members == {}
+    assert list(bridge.carry_out(site, [*dug[:1], bridge.Stage("out", excavate=2, remove="nail")]))[-1].number == 2
+
+
+def test_a_prestress_that_the_soil_does_not_bear_has_a_reason_without_a_number_that_is_none():
+    fem = body((3.0, 1.0), (12, 4), mpm.tresca(young=5e6, poisson=0.3, shear_strength=5e3), [bridge.fixed(BOTTOM)])
+    fem.reconfigure(members={"tie": mpm.strut((3.0, 0.9), (5.0, 0.9), 5e6, prestress=1e6, fixed_end=True)})
+    with pytest.warns(RuntimeWarning, match="the load was not reached") as found:
+        fem.solve(bridge.Load())
+    assert not any("nan" in str(one.message) for one in found)
+
+
+def test_names_of_soils_whose_strength_stays_are_known_after_stages():
+    """A slab under t on clay of 10 kPa: half of it is not reduced, t L = s_u L (1 + 1 / F) / 2."""
+    domain, _, facet_tags = bridge.box_mesh(COMM, (6.0, 0.3), (60, 6))
+    cells = np.arange(bridge.original_cells(domain).size, dtype=np.int32)
+    x, height, _ = compute_midpoints(domain, 2, cells).T
+    numbers = np.where(height > 0.1, 3, np.where(x < 3, 1, 2)).astype(np.int32)
+    cell_tags = bridge.name_tags(meshtags(domain, 2, cells, numbers), {"left": 1, "right": 2, "slab": 3})
+    clay = mpm.tresca(young=20e6, poisson=0.3, shear_strength=10e3)
+    laws = {"left": clay, "right": clay, "slab": mpm.LinearElastic(young=200e6, poisson=0.3)}
+    fem = bridge.QuasiStatic(domain, laws, facet_tags, [bridge.fixed(BOTTOM)], cell_tags=cell_tags)
+    site = bridge.FemSite(fem)
+    site.carry_out(bridge.Stage("ground", fill=list(laws), unit_weight=dict.fromkeys(laws, 0.0)))
+    load = bridge.Load(traction={TOP: (8e3, 0.0)})
+    found = bridge.factor_of_safety(fem, load, start=1.0, unreduced=["left"])
+    assert found.value == pytest.approx(1 / (2 * 8 / 10 - 1), rel=0.03)

@@ -149,6 +149,43 @@ def test_stiff_members_shorten_the_steps_and_keep_them_stable():
         list(model.explicit(until=0.02, dt=plain))
 
 
+def test_a_stiff_member_does_not_make_pic_brake_the_soil():
+    """Its fraction is that of a critical step of the cells, however short the steps are that a member asks for."""
+
+    def energy(model):
+        return np.sum(model.particles.mass[:, None] * model.particles.velocity**2)
+
+    parts = []
+    for members in ({}, {"bar": mpm.bar([(1.1, 0.75), (1.4, 0.75)], 1e9)}):
+        model = block_model(counts=(48, 48))
+        model.install(members)
+        x = model.particles.position - mean(model, "position")
+        model.particles.set("velocity", 2.0 * np.column_stack([-x[:, 1], x[:, 0]]))
+        before = energy(model)
+        list(model.explicit(until=0.02, pic=0.01))
+        parts.append(energy(model) / before)
+    assert parts[0] < 0.999
+    assert parts[1] == pytest.approx(parts[0], abs=0.02)
+
+
+def test_asking_for_the_critical_step_leaves_the_next_report_as_it_is():
+    fem, model = retained()
+    bridge.initialise(model, fem, equilibrate=False)
+    list(model.explicit(until=0.01, nmd=False))
+    assert model.report().unbalanced_ratio < 1e-9
+    model.critical_time_step()
+    assert model.report().unbalanced_ratio < 1e-9
+
+
+def test_a_member_leaves_the_mesh_with_the_soil_that_flows_out():
+    model = block_model(gravity=(0.0, -20.0), boxes=((1.0, 0.1, 1.5, 0.6),))
+    model.outflow(BOTTOM)
+    model.install({"bar": mpm.bar([(1.25, 0.15), (1.25, 0.55)], 5e6)})
+    list(model.explicit(until=0.35))
+    assert len(model.particles) == 0
+    assert np.all(model.member_forces("bar").axial_force == 0.0)
+
+
 def test_a_part_in_the_air_carries_nothing_and_goes_along():
     model = block_model(gravity=(0.0, -10.0))
     model.install({"bar": mpm.bar([(1.25, 0.6), (1.25, 1.9)], 5e6, spacing=0.13)})  # the block ends at 1 m
@@ -318,3 +355,58 @@ def test_an_axisymmetric_model_takes_no_members():
     with pytest.raises(mpm.InputError, match="members in an axisymmetric model"):
         model.install({"bar": mpm.bar([(0.5, 0.5), (1.5, 0.5)], 5e6)})
     assert model.members == {}
+
+
+@pytest.mark.parametrize(
+    ("member", "message"),
+    [
+        (mpm.beam([(0.1, 0.9), (0.1, 0.1)], 2.9e6, 79e3), "'it' is as stiff as a plate 0.572 m thick with a Young's modulus of 5.07e.06 Pa"),
+        (mpm.beam([(0.1, 0.9), (0.1, 0.1)], 24e6, 1.28e6), "as a plate 0.8 m thick with a Young's modulus of 3e.07 Pa"),
+        (mpm.beam([(0.1, 0.9), (0.1, 0.1)], 2.9e9, 79e6, 430.0), "plastic_moment of the member 'it' is 430 N m/m, so that it yields at"),
+        (mpm.bar([(0.1, 0.9), (0.8, 0.9)], 30e3), "axial_stiffness of the member 'it' is 30000 N/m, less than"),
+        (mpm.bar([(0.1, 0.9), (0.8, 0.9)], 30e6, 60.0), "tensile_strength of the member 'it' is 60 N/m, .* strain of 2e-06"),
+        (mpm.strut((0.1, 0.9), (0.8, 0.9), 0.7e9, compressive_strength=800.0), "compressive_strength of the member 'it' is 800 N/m"),
+    ],
+)  # fmt: skip
+def test_members_in_kn_are_a_warning_in_particles_and_in_finite_elements(member, message):
+    """An AZ 18-700, a diaphragm wall of 0.8 m, a nail and a strut, with stiffness or strength in kN."""
+    mesh = bridge.box_mesh(COMM, (1.0, 1.0), (4, 4))
+    model = mpm.Model(bridge.background_mesh(*mesh), mpm.LinearElastic(young=10e6, poisson=0.2))
+    with pytest.warns(RuntimeWarning, match=message):
+        model.install({"it": member})
+    fem = bridge.QuasiStatic(mesh[0], mpm.LinearElastic(young=10e6, poisson=0.2), mesh[2], [bridge.fixed(BOTTOM)])
+    with pytest.warns(RuntimeWarning, match=message):
+        fem.reconfigure(members={"it": member})
+
+
+def test_usual_members_are_no_warning(recwarn):
+    fem, _ = retained()
+    plates = {f"{young:g} {thick}": mpm.beam([(3.0, 3.0), (3.0, 0.8)], young * thick, young * thick**3 / 12, 1e-3 * young * thick**2 / 4)
+              for young, thick in ((30e9, 0.8), (5e9, 0.6), (2e9, 0.4))}  # fmt: skip
+    grids = {f"grid {k}": mpm.bar([(1.0, 1.0), (5.0, 1.0)], k, 0.1 * k, 0.0) for k in (2e5, 2e6)}
+    fem.reconfigure(members={**plates, **grids, "nail": mpm.bar([(1.0, 1.0), (5.0, 1.0)], 30e6, 20e3)})
+    assert not [w for w in recwarn if "not in k" in str(w.message)]
+
+
+@pytest.mark.parametrize(
+    ("member", "place"),
+    [
+        (mpm.bar([(0.2, 2.5), (0.8, 2.6)], 5e6), "0.2, 2.5"),
+        (mpm.strut((1.2, 0.8), (2.8, 1.0), 5e6, prestress=10e3), "2.8, 1"),
+        (mpm.strut((0.2, 2.5), (-2.0, 2.5), 5e6, fixed_end=True), "0.2, 2.5"),
+    ],
+)
+def test_a_member_in_no_soil_is_a_warning_when_particles_start(member, place):
+    model = block_model(gravity=(0.0, -10.0))
+    model.install({"up": member})
+    with pytest.warns(RuntimeWarning, match=rf"the member 'up' carries nothing: there is no soil at \({place}\) m"):
+        model.explicit(until=1e-3).last()
+
+
+def test_a_member_partly_in_soil_is_no_warning(recwarn):
+    model = block_model(gravity=(0.0, -10.0))
+    model.install(
+        {"bar": mpm.bar([(1.25, 0.6), (1.25, 1.9)], 5e6), "tie": mpm.strut((1.2, 1.0), (0.0, 1.0), 5e6, fixed_end=True)}
+    )
+    model.explicit(until=1e-3).last()
+    assert not [w for w in recwarn if "carries nothing" in str(w.message)]

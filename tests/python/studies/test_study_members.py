@@ -47,6 +47,13 @@ def test_the_table_has_the_forces_of_each_member_after_each_stage(braced):
     ]
     assert max(moments, key=abs) == pytest.approx(last["wall_moment_N_m_per_m"], rel=1e-5)
     assert moments[0] == moments[-1] == 0.0
+    # The summary has the largest shear force of a segment, which is that beside the lower strut; nodes have means of two segments.
+    wall = [row for row in rows if row["member"] == "wall" and row["name"] == "cut to 6 m"]
+    heights = [float(row["y_m"]) for row in wall]
+    slopes = [(b - a) / (y0 - y1) for a, b, y0, y1 in zip(moments, moments[1:], heights, heights[1:])]
+    shear = last["wall_shear_force_N_per_m"]
+    assert shear == pytest.approx(max(slopes, key=abs), rel=1e-3)
+    assert abs(shear) > max(abs(float(row["shear_force_N_per_m"])) for row in wall)
     assert (folder / "members.xdmf").exists()
 
 
@@ -64,6 +71,7 @@ def test_struts_carry_the_earth_pressure_that_the_ground_below_does_not(braced):
     [
         ('kind = "beam"', 'kind = "pile"', r"members.wall: kind is 'pile', expected one of 'bar', 'strut', 'beam'"),
         ("bending_stiffness = 79e6", "bending_stifness = 79e6", "members.wall: .*bending_stifness.*bending_stiffness"),
+        ("fixed_end = true", "spacing = 1.0", "upper strut: .*'spacing', expected some of kind, points, axial_stiffness"),
         ("axial_stiffness = 2.9e9", "", "members.wall: .*axial_stiffness"),
         ("axial_stiffness = 2.9e9", "axial_stiffness = -1.0", "members.wall: axial_stiffness is -1.0 N/m"),
         ("points = [[5.0, 20.0], [5.0, 9.0]]", "", "members.wall has no points"),
