@@ -11,7 +11,7 @@ from dolfinx import fem
 from dolfinx.mesh import Mesh
 from mpm_core.checks import within
 from mpm_core.collective import collectively
-from mpm_core.members import Member, MemberForces, of_members
+from mpm_core.members import Member, of_members
 from mpm_core.parameter_fields import Field
 from numpy.typing import ArrayLike, NDArray
 
@@ -26,7 +26,7 @@ from fenics_bridge.fem.failure import explained, warn_of_motion
 from fenics_bridge.fem.fields import SupportedBody, nodal_average
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.kinematics import Kinematics
-from fenics_bridge.fem.linear_solver import AVERAGED_LIMIT, LinearSolver
+from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.load_steps import LoadStep, raise_load
 from fenics_bridge.fem.loads import Load, LoadVectors, warn_of_weight
 from fenics_bridge.fem.locking import warn_of_laws
@@ -38,13 +38,13 @@ from fenics_bridge.fem.solver import Solver, given_solver
 from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.mesh.names import known_tags
 from fenics_bridge.structures.installed import Members
-from fenics_bridge.structures.member_warnings import warn_of_members
+from fenics_bridge.structures.reinforced import ReinforcedBody
 from fenics_bridge.types import Law, Laws, MeshTags, OfPosition
 from fenics_bridge.views import body_text, law_lines
 from mpm_core import Geometry
 
 
-class QuasiStatic(SupportedBody, PointFunctions):
+class QuasiStatic(ReinforcedBody, SupportedBody, PointFunctions):
     """Small-strain equilibrium of a body of one or several materials, plane strain, axisymmetric or 3D, loaded in stages.
 
     Every stage starts from the equilibrium before it; a step that fails does not change that equilibrium. Collective.
@@ -191,24 +191,6 @@ class QuasiStatic(SupportedBody, PointFunctions):
         """
         given = collectively(self.domain.comm, lambda: None if members is None else of_members(members))
         reconfigure(self, off, supports, pore_pressure, stress, law, given)
-
-    @property
-    def members(self) -> dict[str, Member]:
-        """The structural members that are there, by name."""
-        return self._members.given
-
-    def member_forces(self, name: str) -> MemberForces:
-        """Axial forces, moments and displacements of a structural member. Collective.
-
-        Args:
-            name: name of the member.
-
-        Raises:
-            InputError: there is no such member. Raised on all ranks alike.
-        """
-        known = name in self._members.given
-        agree(self.domain.comm, None if known else f"name is {name!r}, expected one of {list(self._members)}")
-        return self._members.result(name, self.displacement.x.array[: self._n_own])
 
     @property
     def laws(self) -> list[Law]:
@@ -363,41 +345,6 @@ class QuasiStatic(SupportedBody, PointFunctions):
         steps = raise_load(self, load, first_step, tolerance, progress)
         warn_of_motion(self)
         return steps
-
-    def require_members(self, members: dict[str, Member], active: Any, where: str = "") -> None:
-        """Require that members suit the body and are in soil that is there. Collective.
-
-        Args:
-            members: members by name.
-            active: function that is 1 in the cells that are there and 0 in others; None where all are.
-            where: what begins the message.
-
-        Raises:
-            InputError: a member of another dimension, in an axisymmetric body, or in no soil. Raised on all ranks alike.
-        """
-        self._prepared_members(members, active, where)
-
-    def _prepared_members(self, members: dict[str, Member], active: Any, where: str = "") -> Any:
-        """Members for `Members.change`, in the cells where a function is 1; raises InputError before anything changes. Collective."""
-        comm, dim = self.domain.comm, self.domain.geometry.dim
-        other = next((name for name, member in members.items() if member.dim != dim), None)
-        wrong = None if other is None else f"{other!r} has {members[other].dim} dimensions, expected {dim}"
-        if members and self.radius is not None:
-            wrong = "there are some in an axisymmetric body, expected plane strain or three dimensions"
-        if members and self._nmd and not self._body.solver.direct:
-            wrong = (
-                f"there are some with nmd=True in more than {AVERAGED_LIMIT} nodes of three dimensions, expected degree=2, or the "
-                f"option -{self._options_prefix}pc_type lu"
-            )
-        agree(comm, wrong and f"{where}members: {wrong}")
-        return self._members.prepared(members, active, where)
-
-    def _change_members(self, prepared: Any) -> None:
-        """Install, keep and remove members that were prepared. Collective."""
-        before = set(self._members)
-        self._members.change(prepared, self.displacement.x.array[: self._n_own])
-        held = self._body.constraints.dofs
-        warn_of_members(self._members, held[held < self._n_own], before, self.domain.comm)
 
     def _internal_forces(self) -> NDArray[np.float64]:
         """Nodal forces of the present stresses, and of the members. Collective."""

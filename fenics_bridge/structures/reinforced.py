@@ -1,0 +1,78 @@
+"""What finite elements have for structural members: their forces, and their changes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mpm_core.members import Member, MemberForces
+
+from fenics_bridge.errors import agree
+from fenics_bridge.fem.linear_solver import AVERAGED_LIMIT
+from fenics_bridge.structures.installed import Members
+from fenics_bridge.structures.member_warnings import warn_of_members
+
+
+class ReinforcedBody:
+    """The part of `QuasiStatic` that concerns structural members."""
+
+    domain: Any
+    displacement: Any
+    radius: Any
+    _body: Any
+    _members: Members
+    _n_own: int
+    _nmd: bool
+    _options_prefix: str
+
+    @property
+    def members(self) -> dict[str, Member]:
+        """The structural members that are there, by name."""
+        return self._members.given
+
+    def member_forces(self, name: str) -> MemberForces:
+        """Axial forces, moments and displacements of a structural member. Collective.
+
+        Args:
+            name: name of the member.
+
+        Raises:
+            InputError: there is no such member. Raised on all ranks alike.
+        """
+        known = name in self._members.given
+        agree(self.domain.comm, None if known else f"name is {name!r}, expected one of {list(self._members)}")
+        return self._members.result(name, self.displacement.x.array[: self._n_own])
+
+    def require_members(self, members: dict[str, Member], active: Any, where: str = "") -> None:
+        """Require that members suit the body and are in soil that is there. Collective.
+
+        Args:
+            members: members by name.
+            active: function that is 1 in the cells that are there and 0 in others; None where all are.
+            where: what begins the message.
+
+        Raises:
+            InputError: a member of another dimension, in an axisymmetric body, or in no soil. Raised on all ranks alike.
+        """
+        self._prepared_members(members, active, where)
+
+    def _prepared_members(self, members: dict[str, Member], active: Any, where: str = "") -> Any:
+        """Members for `Members.change`, in the cells where a function is 1; raises InputError before anything changes. Collective."""
+        comm, dim = self.domain.comm, self.domain.geometry.dim
+        other = next((name for name, member in members.items() if member.dim != dim), None)
+        wrong = None if other is None else f"{other!r} has {members[other].dim} dimensions, expected {dim}"
+        if members and self.radius is not None:
+            wrong = "there are some in an axisymmetric body, expected plane strain or three dimensions"
+        if members and self._nmd and not self._body.solver.direct:
+            wrong = (
+                f"there are some with nmd=True in more than {AVERAGED_LIMIT} nodes of three dimensions, expected degree=2, or the "
+                f"option -{self._options_prefix}pc_type lu"
+            )
+        agree(comm, wrong and f"{where}members: {wrong}")
+        return self._members.prepared(members, active, where)
+
+    def _change_members(self, prepared: Any) -> None:
+        """Install, keep and remove members that were prepared. Collective."""
+        before = set(self._members)
+        self._members.change(prepared, self.displacement.x.array[: self._n_own])
+        held = self._body.constraints.dofs
+        warn_of_members(self._members, held[held < self._n_own], before, self.domain.comm)
