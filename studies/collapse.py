@@ -7,16 +7,19 @@ result converges from above to that of limit analysis; results without dilation 
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from common.checks import say
 from common.collapse_runs import CAPTIONS, CollapseRuns, Target, add_flow_options, dilation_angles
 from common.figures import Pictures
 from common.options import check, study_parser
 from common.page import Page
 from common.ranks import run_study
 from common.results import open_results
+from common.site_file import Site
 from common.site_runs import add_site_option, check_site_options, site_study
 from common.slope_fem import (
     add_fem_slope_options,
@@ -34,6 +37,8 @@ from mpi4py import MPI
 import fenics_bridge as bridge
 
 comm = MPI.COMM_WORLD
+UNLIKELY = 30.0
+"""Factor of the weight of a site, above which its weight is not what makes it fail [-]"""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -88,6 +93,15 @@ def davis_unit_weight(a: Namespace) -> float:
     return bridge.log_spiral(a.height, a.angle, cohesion, reduced, a.crest, depth=a.depth).unit_weight
 
 
+def weight_factor(site: Site, model: bridge.QuasiStatic, progress: Callable) -> bridge.Collapse:
+    """The factor of all unit weights of a site at its collapse; says so where its weight cannot be what makes it fail. Collective."""
+    found = bridge.collapse_load(model, site.load, 0.1, progress=progress)
+    if found.value > UNLIKELY:
+        say(f"the site carries {found.value:.3g} times its weight: its weight hardly makes it fail, as that of level ground or of a pit between "
+            "walls does not, and the factor says nothing of its safety")  # fmt: skip
+    return found
+
+
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
 
 
@@ -106,8 +120,7 @@ def drawn(found: CollapseRuns, spiral: bridge.LogSpiral, folder: Path) -> Pictur
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     if a.site is not None:
-        return site_study(a, lambda site, model, progress: bridge.collapse_load(model, site.load, 0.1, progress=progress),
-                          "collapse_weight_factor", "Factor of all unit weights [-]")  # fmt: skip
+        return site_study(a, weight_factor, "collapse_weight_factor", "Factor of all unit weights [-]")
     start = perf_counter()
     folder = open_results(a, comm)
     spiral = bridge.log_spiral(a.height, a.angle, a.cohesion, a.friction_angle, a.crest, depth=a.depth)

@@ -363,6 +363,29 @@ def test_an_excavation_is_compared_with_the_laws_and_supports_that_stages_bring(
 
 
 @pytest.mark.usefixtures("without_pictures")
+def test_a_site_that_carries_many_times_its_weight_is_said_not_to_fail_by_it(tmp_path):
+    """A bank 0.05 m high of clay of 20 kPa: its stability number of some 4 is reached at a hundred times its weight."""
+    site = f"""
+mesh = "{ROOT}/meshes/bank.geo"
+[constants]
+height = 0.05
+crest = 0.055
+[soils.soil]
+unit_weight = 16e3
+material = "tresca"
+young = 10e6
+poisson = 0.4
+shear_strength = 20e3
+[supports]
+left = "roller"
+base = "fixed"
+"""
+    (tmp_path / "site.toml").write_text(site)
+    options = f"--site {tmp_path / 'site.toml'} --meshes 1 --output {tmp_path / 'results'}"
+    with pytest.warns(RuntimeWarning, match=r"carries \d+ times its weight: its weight hardly makes it fail"):
+        assert importlib.import_module("collapse").main(options.split()) == 0
+
+
 def test_layers_placed_later_are_not_compared_in_elastic_soil(tmp_path):
     """A layer is free of stress on soil that has settled, and so elastic soil, too, has other stresses than at once."""
     stages = '[[stages]]\nfill = ["lower"]\n[[stages]]\nfill = ["upper"]\n'
