@@ -257,7 +257,7 @@ class SiteState:
     def at(self, other: SiteState) -> SiteState:
         """The state of another site with the same tags, on the mesh of this one."""
         new = object.__new__(SiteState)
-        own = ("_comm", "_cells_of", "_facets_of", "_name_of")
+        own = ("_comm", "_cells_of", "_facets_of", "_name_of", "_require_members")
         new.__dict__.update({**other.__dict__, **{name: getattr(self, name) for name in own}})
         return new
 

@@ -45,8 +45,8 @@ class MemberMethods:
                 points, with its prestress.
 
         Raises:
-            InputError: a member of another dimension, a closed or clamped beam, a beam in three dimensions, a name that is there already, or a point outside
-                of the mesh. Raised on all ranks alike.
+            InputError: a member of another dimension, a closed or clamped beam, an axisymmetric model, a name that is there already, or
+                a point outside of the mesh. Raised on all ranks alike.
         """
         model, known = cast("Model", self), forces or {}
         collectively(model.comm, lambda: _require_members(model, members, known))
