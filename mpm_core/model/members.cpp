@@ -1,150 +1,16 @@
 #include "model/members.h"
 
 #include "mesh/search.h"
-#include "model/bond.h"
 #include "model/mapping.h"
+#include "model/member_forces.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <sstream>
 
 namespace mpm::model
 {
 namespace
 {
-/// A segment as it is now.
-template <int D>
-struct Segment
-{
-  Vector<D> along; ///< unit vector
-  double length;   ///< [m]
-};
-
-template <int D>
-Segment<D> segment_of(const Member<D>& member, std::size_t k)
-{
-  Vector<D> edge;
-  for (int a = 0; a < D; ++a)
-    edge[a] = member.positions[k + 1][a] - member.positions[k][a];
-  const double length = norm<D>(edge);
-  for (double& component : edge)
-    component /= length;
-  return {edge, length};
-}
-
-/// The angle from one direction to another, counterclockwise.
-double angle_between(const Vector<2>& from, const Vector<2>& to)
-{
-  return std::atan2(from[0] * to[1] - from[1] * to[0], dot<2>(from, to));
-}
-
-/// Length over which the curvature at inner node k + 1 acts.
-template <int D>
-double length_of_bend(const Member<D>& member, std::size_t k)
-{
-  return 0.5 * (member.initial_lengths[k] + member.initial_lengths[k + 1]);
-}
-
-/// Whether nodes k to last are in soil: a part that hangs in the air carries nothing.
-template <int D>
-bool carries(const Member<D>& member, std::size_t first, std::size_t last)
-{
-  for (std::size_t k = first; k <= last; ++k)
-    if (!member.is_in_soil[k])
-      return false;
-  return true;
-}
-
-/// Largest force between a node and the soil: over half of the segments beside it.
-template <int D>
-double bond_strength_at(const Member<D>& member, std::size_t node)
-{
-  const std::size_t segments = member.initial_lengths.size();
-  const bool is_tied = (node == 0 && member.properties.connected) || (node == segments && member.properties.fixed_end);
-  if (is_tied)
-    return std::numeric_limits<double>::infinity();
-  const std::size_t first = member.properties.has_free_length ? 1 : 0;
-  const double before = node > first ? member.initial_lengths[node - 1] : 0;
-  const double after = node >= first && node < segments ? member.initial_lengths[node] : 0;
-  return member.properties.bond_strength * 0.5 * (before + after);
-}
-
-/// Updates the axial forces to the present lengths of the segments, within their strength and that of the bond.
-template <int D>
-void strain_segments(Member<D>& member, const std::vector<Segment<D>>& now)
-{
-  const MemberProperties& of = member.properties;
-  BondedBar bar;
-  for (std::size_t k = 0; k < now.size(); ++k)
-  {
-    const bool is_whole = carries<D>(member, k, k + 1);
-    bar.stiffness.push_back(of.axial_stiffness / member.initial_lengths[k]);
-    bar.force.push_back(bar.stiffness[k] * (now[k].length - member.free_lengths[k]));
-    bar.least.push_back(is_whole ? -of.compressive_strength : 0);
-    bar.largest.push_back(is_whole ? of.tensile_strength : 0);
-  }
-  if (std::isfinite(of.bond_strength))
-  {
-    for (std::size_t n = 0; n <= now.size(); ++n)
-      bar.bond_strength.push_back(bond_strength_at<D>(member, n));
-    member.axial_force = forces_with_slip(bar);
-  }
-  else
-    for (std::size_t k = 0; k < now.size(); ++k)
-      member.axial_force[k] = std::clamp(bar.force[k], bar.least[k], bar.largest[k]);
-  for (std::size_t k = 0; k < now.size(); ++k)
-    if (member.axial_force[k] != bar.force[k])
-      member.free_lengths[k] = now[k].length - member.axial_force[k] / bar.stiffness[k];
-}
-
-/// Adds the internal forces of the moment at inner node k + 1: M times the derivatives of the angle there.
-void bend_node(Member<2>& member, std::size_t k, std::vector<Vector<2>>& internal)
-{
-  const MemberProperties& of = member.properties;
-  const Segment<2> before = segment_of(member, k), after = segment_of<2>(member, k + 1);
-  const double stiffness = of.bending_stiffness / length_of_bend<2>(member, k);
-  const double angle = angle_between(before.along, after.along);
-  const double elastic = stiffness * (angle - member.free_angles[k]);
-  const double moment = carries(member, k, k + 2) ? std::clamp(elastic, -of.plastic_moment, of.plastic_moment) : 0;
-  if (moment != elastic)
-    member.free_angles[k] = angle - moment / stiffness;
-  member.moments[k] = moment;
-  const auto turn = [&](const Segment<2>& segment, std::size_t first, double sign)
-  {
-    const Vector<2> across{-segment.along[1], segment.along[0]};
-    for (int a = 0; a < 2; ++a)
-    {
-      const double force = sign * moment * across[a] / segment.length;
-      internal[first][a] -= force;
-      internal[first + 1][a] += force;
-    }
-  };
-  turn(after, k + 1, 1);
-  turn(before, k, -1);
-}
-
-/// Internal forces of the nodes, with the axial forces and moments of the present positions.
-template <int D>
-std::vector<Vector<D>> internal_forces(Member<D>& member)
-{
-  std::vector<Vector<D>> internal(member.positions.size());
-  std::vector<Segment<D>> now;
-  for (std::size_t k = 0; k + 1 < member.positions.size(); ++k)
-    now.push_back(segment_of<D>(member, k));
-  strain_segments<D>(member, now);
-  for (std::size_t k = 0; k < now.size(); ++k)
-    for (int a = 0; a < D; ++a)
-    {
-      internal[k][a] -= member.axial_force[k] * now[k].along[a];
-      internal[k + 1][a] += member.axial_force[k] * now[k].along[a];
-    }
-  if constexpr (D == 2)
-    for (std::size_t k = 0; k < member.moments.size(); ++k)
-      bend_node(member, k, internal);
-  return internal;
-}
-
 /// Sum of the weights of a node before they are made parts of it, below which it counts as not in soil.
 constexpr double least_filling = 0.05;
 
@@ -245,13 +111,6 @@ std::vector<GlobalIndex> cells_of_nodes(const Model<G>& model, const Member<D>& 
   return cells;
 }
 
-/// How many nodes are moved by the soil: all but one that is held in space.
-template <int D>
-std::size_t moving_nodes(const Member<D>& member)
-{
-  return member.positions.size() - (member.properties.fixed_end ? 1 : 0);
-}
-
 /// What a rank knows of a node of a member, and what all sum up.
 template <int D>
 struct NodeMotion
@@ -275,6 +134,7 @@ std::size_t leader_of(const Member<D>& member, std::size_t k)
   }
   return k;
 }
+
 /// Finds the cells of the nodes of all members; one that has flowed out with the soil has none.
 /// @throws RunError on all ranks, for a node outside of the mesh where soil may not flow out, or all must be inside
 /// @note Collective
@@ -301,38 +161,6 @@ void find_hosts(Model<G>& model, bool all_inside)
   }
 }
 } // namespace
-
-template <int D>
-Member<D> make_member(std::string name, const MemberProperties& properties, std::vector<Vector<D>> positions,
-                      std::vector<double> axial_force, std::vector<double> moments)
-{
-  Member<D> member{std::move(name),
-                   properties,
-                   std::move(positions),
-                   {},
-                   {},
-                   {},
-                   std::move(axial_force),
-                   std::move(moments),
-                   {},
-                   {},
-                   {}};
-  const std::size_t segments = member.positions.size() - 1;
-  for (std::size_t k = 0; k < segments; ++k)
-  {
-    const double length = segment_of<D>(member, k).length;
-    member.initial_lengths.push_back(length);
-    member.free_lengths.push_back(length * (1 - member.axial_force[k] / properties.axial_stiffness));
-  }
-  if constexpr (D == 2)
-    for (std::size_t k = 0; k < member.moments.size(); ++k)
-      member.free_angles.push_back(angle_between(segment_of<D>(member, k).along, segment_of<D>(member, k + 1).along) -
-                                   member.moments[k] * length_of_bend<D>(member, k) / properties.bending_stiffness);
-  member.is_in_soil.assign(member.positions.size(), 1);
-  member.cells.assign(member.positions.size(), none);
-  member.hosts.resize(member.positions.size());
-  return member;
-}
 
 template <class G>
 void begin_members(Model<G>& model, bool all_inside)
@@ -436,20 +264,7 @@ double squared_frequency_of_members(Model<G>& model)
   sums.resize(field.nodes.size());
   for (Member<D>& member : model.members)
   {
-    // Rows of |B|^T L D |B| of the member, summed: bounds of its largest eigenvalue by Gershgorin's theorem
-    std::vector<double> rows(member.positions.size(), 0);
-    for (std::size_t k = 0; k + 1 < rows.size(); ++k)
-      for (const std::size_t n : {k, k + 1})
-        rows[n] += 2 * member.properties.axial_stiffness / member.initial_lengths[k];
-    for (std::size_t k = 0; k < member.moments.size(); ++k)
-    {
-      const double before = 1 / member.initial_lengths[k], after = 1 / member.initial_lengths[k + 1];
-      const double stiffness = member.properties.bending_stiffness / length_of_bend<D>(member, k);
-      const double all = 2 * (before + after);
-      rows[k] += stiffness * before * all;
-      rows[k + 1] += stiffness * (before + after) * all;
-      rows[k + 2] += stiffness * after * all;
-    }
+    const std::vector<double> rows = stiffness_rows<D>(member);
     for (std::size_t n = 0; n < moving_nodes(member); ++n)
     {
       MemberHost<D>& host = member.hosts[n];
@@ -477,11 +292,6 @@ double squared_frequency_of_members(Model<G>& model)
   return largest;
 }
 
-#define INSTANTIATE_DIMENSION(D)                                                                                       \
-  template Member<D> make_member<D>(std::string, const MemberProperties&, std::vector<Vector<D>>, std::vector<double>, \
-                                    std::vector<double>);
-INSTANTIATE_DIMENSION(2)
-INSTANTIATE_DIMENSION(3)
 #define INSTANTIATE(G)                                                                                                 \
   template void begin_members(Model<G>&, bool);                                                                        \
   template void add_member_forces(Model<G>&, VelocityField<G>&);                                                       \

@@ -9,13 +9,6 @@
 
 namespace mpm::model
 {
-/// A member with these nodes and these forces in it, undeformed otherwise.
-/// @param axial_force  of its segments
-/// @param moments  at its inner nodes; empty without bending
-template <int D>
-Member<D> make_member(std::string name, const MemberProperties& properties, std::vector<Vector<D>> positions,
-                      std::vector<double> axial_force, std::vector<double> moments);
-
 /// Finds what members need of mesh and soil, after anything but a step has changed them: the cells of their nodes, the
 /// volumes of the cells around the nodes of the mesh, and the density of the soil.
 /// @param all_inside  whether no node may be outside of the mesh, also where soil may flow out

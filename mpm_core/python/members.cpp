@@ -1,6 +1,7 @@
 #include "python/bindings.h"
 
 #include "model/bond.h"
+#include "model/member_forces.h"
 #include "model/members.h"
 
 #include <pybind11/numpy.h>
