@@ -37,7 +37,7 @@ from fenics_bridge.water.boundary import value_at
 from .consolidation_stages import GroundStage, Table, pressure_table, stages_of
 from .checks import say
 from .site_doubts import warn_of_reservoirs
-from .site_file import CHANGES, Site, part_of_mesh, site_of
+from .site_file import CHANGES, Site, part_of_mesh, site_of, warn_of_members
 from .site_keys import DAY, changes_of
 from .slope_case import GRAVITY
 from .water_site import (
@@ -244,6 +244,7 @@ def read_consolidation_site(
     changes = changes_of(rows, [key for key in CHANGES if key != "excavate"])
     if changes:
         say(f"{path}: this study leaves out {changes}")
+    warn_of_members(table, path)
     site = site_of(effective_laws(table), path, comm, cell_size)
     mesh = part_of_mesh((site.domain, site.cell_tags, site.facet_tags), soils)
     for name in pressures or {}:

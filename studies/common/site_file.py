@@ -194,6 +194,14 @@ def warn_of_pressures(table: dict[str, Any], path: Path) -> None:
             "the pressure of a stage")  # fmt: skip
 
 
+def warn_of_members(table: dict[str, Any], path: Path) -> None:
+    """Warn of the structural members of a file for a study that has none."""
+    if table.get("members"):
+        names = ", ".join(map(repr, table["members"]))
+        say(f"{path}: the structural members {names} are left out here; the studies safety, collapse, slope, excavation and embankment have "
+            "them")  # fmt: skip
+
+
 def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = None) -> Site:
     """The site that a table describes, as `read_site` has it from a file; path: of the file, for its mesh and messages."""
     axisymmetric = table.get("axisymmetric", False)

@@ -23,7 +23,7 @@ from fenics_bridge.water.soils import WATER_WEIGHT
 
 from .checks import say
 from .site_doubts import warn_of_flooded_ground, warn_of_reservoirs
-from .site_file import CHANGES, Site, site_of, warn_of_pressures
+from .site_file import CHANGES, Site, site_of, warn_of_members, warn_of_pressures
 from .site_keys import changes_of
 from .water_site import boundary_of, corners_of, effective_laws, read_water_table, standing_load, times_of, wet_soils
 
@@ -127,6 +127,7 @@ def read_slope_site(path: Path, comm: MPI.Comm, cell_size: float | None = None, 
     if changes:
         say(f"{path}: all soils are there at once, and this study leaves out {changes}")
     warn_of_pressures(table, path)
+    warn_of_members(table, path)
     boundary = [_slower(one, slower) for one in boundary_of(table, path).values()]
     site = site_of(effective_laws(table), path, comm, cell_size)
     body = site.body()
