@@ -178,6 +178,8 @@ def site_by_particles(a: Namespace, site: Site) -> bridge.ParticleSafety:
         gravity = model.gravity
         gravity[0] += a.seismic_coefficient * GRAVITY
         model.set_gravity(gravity)
+        if not site.stages:
+            model.install(site.members)
         return model
 
     return bridge.particle_safety(

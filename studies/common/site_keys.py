@@ -119,7 +119,7 @@ def _require_known(given: Any, known: Collection[str], where: str) -> None:
 def _require_member(given: Any, where: str) -> None:
     """Require that the keys of a structural member are those of its kind."""
     kind = given.get("kind") if isinstance(given, dict) else None
-    if kind not in MEMBERS:
+    if not isinstance(kind, str) or kind not in MEMBERS:
         raise mpm.InputError(f"{where}: kind is {kind!r}, expected one of {', '.join(map(repr, MEMBERS))}")
     arguments = [name for name in signature(MEMBERS[kind]).parameters if name not in ("start", "end", "points")]
     _require_known(given, ("kind", "points", *arguments), where)

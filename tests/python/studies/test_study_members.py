@@ -5,6 +5,7 @@ import importlib
 import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from mpi4py import MPI
@@ -134,6 +135,19 @@ def test_nails_of_a_site_without_stages_hold_its_slope_and_move_with_it(tmp_path
         importlib.import_module("safety").main(
             f"--site {without} --cell-size 1.5 --meshes 1 --start 0.9 --output {tmp_path / 'without'}".split()
         )
+
+
+def test_a_factor_by_particles_has_the_members_of_a_site_without_stages(tmp_path, monkeypatch):
+    safety, seen = importlib.import_module("safety"), []
+
+    def found(weakened, **_):
+        seen.append(weakened(1.1))
+        return SimpleNamespace(value=1.2, failed_at=1.3, failed=True, reason="")
+
+    monkeypatch.setattr(safety.bridge, "particle_safety", found)
+    site = site_file.read_site(nailed_in(tmp_path), MPI.COMM_WORLD, 3.0)
+    safety.site_by_particles(SimpleNamespace(start=1.0, unreduced=[], seismic_coefficient=0.0, elements="P2"), site)
+    assert list(seen[0].members) == list(site.members) and len(site.members) == 6
 
 
 def test_a_member_that_no_stage_installs_is_named(tmp_path):
