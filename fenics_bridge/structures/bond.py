@@ -6,6 +6,8 @@ import numpy as np
 from mpm_core.members import Member
 from numpy.typing import NDArray
 
+from mpm_core import _core
+
 AT_LIMIT = 1e-9
 """Distance from a limit, relative to it, below which a force is at it"""
 
@@ -17,14 +19,8 @@ def bond_strengths(member: Member, lengths: NDArray[np.float64]) -> NDArray[np.f
         member: the bar.
         lengths: of its segments [m], shape (n - 1,).
     """
-    bonded = np.where((np.arange(len(lengths)) == 0) & (member.free_length > 0), 0.0, lengths)
-    halves = (np.append(bonded, 0.0) + np.append(0.0, bonded)) / 2
-    strengths = member.bond_strength * halves
-    if member.connected:
-        strengths[0] = np.inf
-    if member.fixed_end:
-        strengths[-1] = np.inf
-    return strengths
+    properties = member.bond_strength, member.free_length > 0, member.connected, member.fixed_end
+    return np.array(_core.bond_strengths(lengths, *properties))
 
 
 def slip_tangent(

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace mpm::model
 {
@@ -14,7 +15,7 @@ struct Knot
   double force, derivative;
 };
 
-/// Forces from which `knots` are known, from the first to the last of them.
+/// Knots by rising force; the energy is infinite beyond the first and the last of them.
 using Derivative = std::vector<Knot>;
 
 /// Value at a force between the first and the last knot.
@@ -72,6 +73,24 @@ Derivative across_bond(const Derivative& before, double minimum, double strength
   return after;
 }
 } // namespace
+
+std::vector<double> bond_strengths(const std::vector<double>& lengths, double strength, bool has_free_length,
+                                   bool connected, bool fixed_end)
+{
+  const std::size_t segments = lengths.size(), first = has_free_length ? 1 : 0;
+  std::vector<double> strengths;
+  for (std::size_t node = 0; node <= segments; ++node)
+  {
+    const double before = node > first ? lengths[node - 1] : 0;
+    const double after = node >= first && node < segments ? lengths[node] : 0;
+    strengths.push_back(strength * 0.5 * (before + after));
+  }
+  if (connected)
+    strengths.front() = std::numeric_limits<double>::infinity();
+  if (fixed_end)
+    strengths.back() = std::numeric_limits<double>::infinity();
+  return strengths;
+}
 
 std::vector<double> forces_with_slip(const BondedBar& bar)
 {

@@ -16,6 +16,15 @@ struct BondedBar
   std::vector<double> bond_strength; ///< largest force between soil and each node [N/m]; infinite where it is connected
 };
 
+/// Largest force between soil and each node of a bar: over half of the segments beside it; infinite where it cannot
+/// slip.
+/// @param lengths  of its segments [m]
+/// @param strength  per length [N/m2]
+/// @param has_free_length  whether the first segment has no bond
+/// @param connected, fixed_end  whether the first and the last node cannot slip
+std::vector<double> bond_strengths(const std::vector<double>& lengths, double strength, bool has_free_length,
+                                   bool connected, bool fixed_end);
+
 /// Axial forces after the nodes have slipped along the bar as far as they must: the admissible forces that are nearest
 /// to the given ones in complementary energy, sum (N - N_stick)^2 / (2 E A / L). Forces are admissible within the
 /// strength of the segments, if those on both sides of a node differ by no more than its bond holds; there is none

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace mpm::model
 {
@@ -53,20 +52,6 @@ bool carries(const Member<D>& member, std::size_t first, std::size_t last)
   return true;
 }
 
-/// Largest force between a node and the soil: over half of the segments beside it.
-template <int D>
-double bond_strength_at(const Member<D>& member, std::size_t node)
-{
-  const std::size_t segments = member.initial_lengths.size();
-  const bool is_tied = (node == 0 && member.properties.connected) || (node == segments && member.properties.fixed_end);
-  if (is_tied)
-    return std::numeric_limits<double>::infinity();
-  const std::size_t first = member.properties.has_free_length ? 1 : 0;
-  const double before = node > first ? member.initial_lengths[node - 1] : 0;
-  const double after = node >= first && node < segments ? member.initial_lengths[node] : 0;
-  return member.properties.bond_strength * 0.5 * (before + after);
-}
-
 /// Updates the axial forces to the present lengths of the segments, within their strength and that of the bond.
 template <int D>
 void strain_segments(Member<D>& member, const std::vector<Segment<D>>& now)
@@ -83,8 +68,8 @@ void strain_segments(Member<D>& member, const std::vector<Segment<D>>& now)
   }
   if (std::isfinite(of.bond_strength))
   {
-    for (std::size_t n = 0; n <= now.size(); ++n)
-      bar.bond_strength.push_back(bond_strength_at<D>(member, n));
+    bar.bond_strength =
+        bond_strengths(member.initial_lengths, of.bond_strength, of.has_free_length, of.connected, of.fixed_end);
     member.axial_force = forces_with_slip(bar);
   }
   else

@@ -88,6 +88,7 @@ void bind_members_of(py::module_& m)
 
 void bind_members(py::module_& m)
 {
+  m.def("bond_strengths", &bond_strengths);
   m.def("forces_with_slip",
         [](const std::vector<double>& force, const std::vector<double>& stiffness, const std::vector<double>& least,
            const std::vector<double>& largest, const std::vector<double>& bond_strength)
