@@ -109,7 +109,6 @@ class LinearSolver:
         failure, added = "", 0.0
         for part in [p for p in (0.0, *PARTS) if p >= self._part]:
             if self._first is not None and part > added:
-                # Members that slip along the soil have other entries than those that stick to it.
                 matrix.axpy(part - added, self._first, PETSc.Mat.Structure.UNKNOWN_NONZERO_PATTERN)
                 added = part
             solution.set(0.0)

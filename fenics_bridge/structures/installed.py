@@ -96,7 +96,9 @@ class Members:
         self._trial: NDArray[np.float64] = np.zeros(0)
         self._tangent: Any = None  # derivatives of the forces by the strains
         self._strains: Any = None
-        self._places: Any = None  # 1 where a force may depend on a strain
+        self._own_strains: Any = None  # the columns of this rank's own dofs
+        self._lengths: NDArray[np.float64] = np.zeros(0)
+        self._places: Any = None  # zeros wherever the stiffness may have entries, a matrix of PETSc
 
     def __bool__(self) -> bool:
         return bool(self._there)
@@ -145,8 +147,13 @@ class Members:
                 one.origin = self._moved(one, displacement)
             else:
                 one.stressing = False
-        self._strains = sparse.vstack([one.strain for one in prepared.values()]).tocsr() if prepared else None
-        self._places = sparse.block_diag([one.places() for one in prepared.values()]) if prepared else None
+        if prepared:
+            there = prepared.values()
+            self._strains = sparse.vstack([one.strain for one in there]).tocsr()
+            self._own_strains = self._own(self._strains)
+            self._lengths = np.concatenate([one.lengths for one in there])
+            depends = sparse.block_diag([one.places() for one in there])
+            self._places = self._matrix(0.0 * (abs(self._own_strains).T @ depends @ abs(self._strains)))
         self.back()
 
     def lock_off(self) -> None:
@@ -187,7 +194,7 @@ class Members:
 
     def forces(self) -> Any:
         """Internal nodal forces on this rank's own dofs [N]."""
-        return self._own(self._strains).T @ (self._lengths() * self._trial)
+        return self._own_strains.T @ (self._lengths * self._trial)
 
     def with_stiffness(self, matrix: PETSc.Mat, held: NDArray[np.integer]) -> PETSc.Mat:
         """A matrix of the soil with the members' stiffness, without rows and columns of the supports. Collective.
@@ -199,11 +206,10 @@ class Members:
             held: this rank's own dofs that supports prescribe.
         """
         of_all = self._strains @ sparse.diags(1 - self.of_all_ranks(held))
-        stiffness = self._own(of_all).T @ sparse.diags(self._lengths()) @ self._tangent @ of_all
+        stiffness = self._own(of_all).T @ sparse.diags(self._lengths) @ self._tangent @ of_all
         # Products leave out zeros, as of what yields, but the solver adds matrices to one another whose entries are at the same places.
-        places = self._own(abs(self._strains)).T @ self._places @ abs(self._strains)
         both = matrix.copy()
-        both.axpy(1.0, self._matrix(0.0 * places), PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        both.axpy(1.0, self._places, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
         both.axpy(1.0, self._matrix(stiffness), PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         return both
 
@@ -289,14 +295,11 @@ class Members:
         return matrix[:, self._first : self._first + self._n_own]
 
     def _strain(self, displacement: NDArray[np.float64]) -> Any:
-        return self._comm.allreduce(self._own(self._strains) @ displacement)
+        return self._comm.allreduce(self._own_strains @ displacement)
 
     def _moved(self, one: _Installed, displacement: NDArray[np.float64]) -> Any:
         """Displacements of the nodes of a member (n, D) [m]. Collective."""
         return self._comm.allreduce(self._own(one.movement) @ displacement).reshape(one.nodes.shape)
-
-    def _lengths(self) -> NDArray[np.float64]:
-        return np.concatenate([one.lengths for one in self._there.values()])
 
     def reset(self) -> None:
         """Start with the prestress alone, the displacements of the body being zero."""
