@@ -7,6 +7,7 @@ from typing import Any
 
 import basix
 import numpy as np
+from mpm_core.members import SAMPLES, samples_of
 from numpy.typing import NDArray
 
 from fenics_bridge import compat
@@ -18,9 +19,6 @@ from fenics_bridge.mesh.tagged import owned_cells
 TOLERANCE = 0.02
 """How far outside of the soil a point may be, in barycentric coordinates of the nearest cell: the corners of a line that the mesh
 follows are known by rounded coordinates only"""
-
-SAMPLES = 100
-"""Points along a line at which the size of the cells around it is looked up"""
 
 
 class Embedding:
@@ -64,12 +62,8 @@ def cell_sizes_along(domain: Any, lines: Sequence[NDArray[np.float64]]) -> list[
     """Median length of the edges of the cells along each line (k, D) [m]; 0 where it is outside of the mesh. Collective."""
     if not lines:
         return []
-    samples = []
-    for line in lines:
-        ends = np.linspace(0, len(line) - 1, SAMPLES)
-        part = np.minimum(ends.astype(int), len(line) - 2)
-        samples.append(line[part] + (ends - part)[:, None] * (line[part + 1] - line[part]))
-    cells = _active_cells(domain, np.concatenate(samples), None).reshape(len(lines), SAMPLES)
+    samples = np.concatenate([samples_of(line) for line in lines])
+    cells = _active_cells(domain, samples, None).reshape(len(lines), SAMPLES)
     first, second = np.triu_indices(domain.geometry.dim + 1, 1)
     sizes = []
     for found in cells:

@@ -92,8 +92,7 @@ def _bodies(model: mpm.Model) -> dict[str, np.ndarray]:
     outlines = [contact.outline() for contact in model.contacts]
     segments = [points[cells] for points, cells in outlines]
     for name in model.members:
-        forces = model.member_forces(name)
-        nodes = forces.positions + forces.displacement
+        nodes = model.member_forces(name).places
         segments.append(np.stack([nodes[:-1], nodes[1:]], axis=1))
     return {"bodies": np.concatenate(segments)} if segments else {}
 

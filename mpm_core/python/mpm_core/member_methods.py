@@ -15,16 +15,13 @@ from ._core import InputError
 from .collective import collectively
 from .mesh import cell_sizes
 from .member_warnings import odd_units, rigid_beam, rigid_fraction
-from .members import Member, MemberForces, of_members
+from .members import Member, MemberForces, of_members, samples_of
 
 if TYPE_CHECKING:
     from .model import Model
 
 STRENGTHS = ("tensile_strength", "compressive_strength", "plastic_moment", "bond_strength")
 """Entries of a member that may be infinite, which JSON does not have"""
-
-SAMPLES = 100
-"""Points of a line at which the size of the cells around it is looked up"""
 
 
 class MemberMethods:
@@ -62,7 +59,7 @@ class MemberMethods:
         for name, member in members.items():
             if name in known:
                 given = known[name]
-                positions, axial, moment = given.positions + given.displacement, given.axial_force, given.moment
+                positions, axial, moment = given.places, given.axial_force, given.moment
             else:
                 positions = member.nodes(_size_along(model, np.array(member.points)))
                 axial, moment = np.full(len(positions) - 1, member.prestress), np.zeros(len(positions))
@@ -152,9 +149,7 @@ def _require_members(model: Model, members: dict[str, Member], forces: dict[str,
 
 def _size_along(model: Model, line: NDArray[np.float64]) -> float:
     """Median size of the cells along a line (k, D) [m]. Collective."""
-    ends = np.linspace(0, len(line) - 1, SAMPLES)
-    part = np.minimum(ends.astype(int), len(line) - 2)
-    cells = model.mesh.cells_of(line[part] + (ends - part)[:, None] * (line[part + 1] - line[part]))
+    cells = model.mesh.cells_of(samples_of(line))
     cells = cells[(cells >= 0) & (cells < model.mesh.owned_cells)]
     sizes = cell_sizes(model.mesh.cell_volumes[cells], model.mesh.dim)
     every = np.concatenate(model.comm.allgather(sizes))

@@ -80,11 +80,11 @@ def rigid_fraction(model: Model, nodes: NDArray[np.float64]) -> float:
     return float(np.mean(model.comm.allreduce(inside.astype(int)) > 0))
 
 
-def members_in_air(model: Model, positions: dict[str, NDArray[np.float64]]) -> str:
-    """What a warning says of members that carry nothing, as there is no soil around their nodes, now at `positions` (n, D) [m] by name;
-    empty without any. Collective."""
+def members_in_air(model: Model) -> str:
+    """What a warning says of members that carry nothing, as there is no soil around their nodes; empty without any. Collective."""
     for name, member in model.members.items():
-        nodes = positions[name][:-1] if member.fixed_end else positions[name]
+        places = model.member_forces(name).places
+        nodes = places[:-1] if member.fixed_end else places
         in_air = ~_in_soil(model, nodes)
         if in_air.all() or (not member.bonded and in_air.any()):
             where = ", ".join(f"{x:.6g}" for x in nodes[int(np.argmax(in_air))])

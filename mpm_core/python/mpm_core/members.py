@@ -13,6 +13,9 @@ from . import _core
 from ._core import InputError
 from .checks import flag, positive, real_numbers, within
 
+SAMPLES = 100
+"""Points along a line at which the size of the cells around it is looked up"""
+
 CLOSED = 1e-6
 """Distance of the last point of a closed line from its first, over its length, at most: corners of a circle are rounded"""
 
@@ -94,6 +97,13 @@ class Member:
             count = max(1, math.ceil(float(np.linalg.norm(end - start)) / (self.spacing or spacing) - 1e-6))
             parts.append(start + np.linspace(0, 1, count + 1)[1:, None] * (end - start))
         return np.concatenate(parts)
+
+
+def samples_of(line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (SAMPLES, D) [m] along a line (k, D) [m]."""
+    ends = np.linspace(0, len(line) - 1, SAMPLES)
+    part = np.minimum(ends.astype(int), len(line) - 2)
+    return line[part] + (ends - part)[:, None] * (line[part + 1] - line[part])
 
 
 def bar(
@@ -310,6 +320,11 @@ class MemberForces:
     """Axial force of each segment [N/m], tension positive, shape (n - 1,)"""
     moment: NDArray[np.float64]
     """Bending moment at the nodes [N m/m], 0 at free ends, shape (n,); positive where its left side, seen along its line, is compressed"""
+
+    @property
+    def places(self) -> NDArray[np.float64]:
+        """Where its nodes are now [m], shape (n, D)."""
+        return self.positions + self.displacement
 
     @property
     def bends(self) -> bool:

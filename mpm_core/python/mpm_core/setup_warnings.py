@@ -33,9 +33,7 @@ def warn_of_setup(model: Model, nmd: bool, damping: float = 0.0, until: float = 
     of_loads = _nothing_acts(model), _nothing_holds(model), _upwards(model), _weight(model) or _softness(model)
     of_laws, of_boundaries = doubts_of_laws(model, nmd), doubts_of_boundaries(model, damping)
     of_water = _tilted_water(model), undrained_friction(model, until), undrained_border(model)
-    of_members = members_in_air(
-        model, {name: (forces := model.member_forces(name)).positions + forces.displacement for name in model.members}
-    )
+    of_members = members_in_air(model)
     found = [text for text in (*of_loads, *of_laws, *of_boundaries, *of_water, of_members) if text]
     if model.comm.rank == 0:
         for text in found:
