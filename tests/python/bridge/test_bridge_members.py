@@ -21,6 +21,14 @@ def body(lengths, counts, law, supports, **options):
     return bridge.QuasiStatic(domain, law, facet_tags, supports, cell_tags=cell_tags, **options)
 
 
+def tagged(lengths, counts, number_of):
+    """Mesh of a box, tags of its cells, a function of the positions (x, y) of their centres, and tags of its facets."""
+    domain, _, facet_tags = bridge.box_mesh(COMM, lengths, counts)
+    cells = np.arange(bridge.original_cells(domain).size, dtype=np.int32)
+    numbers = number_of(*compute_midpoints(domain, 2, cells)[:, :2].T)
+    return domain, meshtags(domain, 2, cells, numbers.astype(np.int32)), facet_tags
+
+
 @pytest.mark.parametrize("options", [{"degree": 1}, {"degree": 2}, {"degree": 4}, {"degree": 1, "nmd": True}])
 def test_a_bar_and_soil_share_the_force_of_a_plate_by_their_stiffness(options):
     young, stiffness, strain = 1e6, 3e6, 0.005
@@ -188,10 +196,7 @@ def test_a_member_that_a_stage_removes_and_installs_is_stressed_anew():
 
 def slab(thick=0.1):
     """A strong slab 6 m long on a thin layer of clay on a rigid base; the strength of the clay is 10 kPa."""
-    domain, _, facet_tags = bridge.box_mesh(COMM, (6.0, 0.3), (60, 6))
-    cells = np.arange(bridge.original_cells(domain).size, dtype=np.int32)
-    height = compute_midpoints(domain, 2, cells)[:, 1]
-    cell_tags = meshtags(domain, 2, cells, np.where(height < thick, 1, 2).astype(np.int32))
+    domain, cell_tags, facet_tags = tagged((6.0, 0.3), (60, 6), lambda x, y: np.where(y < thick, 1, 2))
     laws = {1: mpm.tresca(young=20e6, poisson=0.3, shear_strength=10e3), 2: mpm.LinearElastic(young=200e6, poisson=0.3)}
     return bridge.QuasiStatic(domain, laws, facet_tags, [bridge.fixed(BOTTOM)], cell_tags=cell_tags)
 
@@ -250,10 +255,9 @@ def test_a_geogrid_carries_no_compression():
 def test_an_anchor_is_pulled_out_by_the_strength_of_its_bond(degree, cells):
     """A block on rollers hangs on an anchor alone, whose body of 1.5 m slips under the force q L, on all meshes alike."""
     bond, length = 4e3, 1.5
-    domain, _, facet_tags = bridge.box_mesh(COMM, (4.0, 2.0), (4 * cells, 2 * cells))
-    numbers = np.arange(bridge.original_cells(domain).size, dtype=np.int32)
-    x = compute_midpoints(domain, 2, numbers)[:, 0]
-    cell_tags = meshtags(domain, 2, numbers, np.where(x < 1, 1, np.where(x < 1.5, 2, 3)).astype(np.int32))
+    domain, cell_tags, facet_tags = tagged(
+        (4.0, 2.0), (4 * cells, 2 * cells), lambda x, y: np.digitize(x, [1, 1.5]) + 1
+    )
     soil = mpm.LinearElastic(young=20e6, poisson=0.3)
     supports = [bridge.fixed(LEFT), bridge.roller(BOTTOM, (0, 1))]
     fem = bridge.QuasiStatic(domain, soil, facet_tags, supports, degree=degree, cell_tags=cell_tags)
@@ -350,10 +354,7 @@ def test_stages_that_install_and_remove_what_is_not_there_are_errors():
 
 
 def test_a_stage_that_digs_soil_away_from_a_member_changes_nothing():
-    domain, _, facet_tags = bridge.box_mesh(COMM, (4.0, 2.0), (16, 8))
-    cells = np.arange(bridge.original_cells(domain).size, dtype=np.int32)
-    x, y, _ = compute_midpoints(domain, 2, cells).T
-    cell_tags = meshtags(domain, 2, cells, np.where((x < 2) & (y > 1), 2, 1).astype(np.int32))
+    domain, cell_tags, facet_tags = tagged((4.0, 2.0), (16, 8), lambda x, y: np.where((x < 2) & (y > 1), 2, 1))
     soil, supports = mpm.LinearElastic(young=10e6, poisson=0.3), [bridge.fixed(BOTTOM), bridge.roller(LEFT, (1, 0))]
     fem = bridge.QuasiStatic(domain, soil, facet_tags, supports, cell_tags=cell_tags)
     site = bridge.FemSite(fem)
@@ -369,10 +370,7 @@ def test_a_stage_that_digs_soil_away_from_a_member_changes_nothing():
 
 
 def test_stages_find_members_in_no_soil_before_anything_is_computed():
-    domain, _, facet_tags = bridge.box_mesh(COMM, (2.0, 2.0), (8, 8))
-    cells = np.arange(bridge.original_cells(domain).size, dtype=np.int32)
-    height = compute_midpoints(domain, 2, cells)[:, 1]
-    cell_tags = meshtags(domain, 2, cells, np.where(height < 1, 1, 2).astype(np.int32))
+    domain, cell_tags, facet_tags = tagged((2.0, 2.0), (8, 8), lambda x, y: np.where(y < 1, 1, 2))
     fem = bridge.QuasiStatic(
         domain, mpm.LinearElastic(young=1e6, poisson=0.0), facet_tags, [bridge.fixed(BOTTOM)], cell_tags=cell_tags
     )
@@ -408,11 +406,8 @@ def test_a_prestress_that_the_soil_does_not_bear_has_a_reason_without_a_number_t
 
 def test_names_of_soils_whose_strength_stays_are_known_after_stages():
     """A slab under t on clay of 10 kPa: half of it is not reduced, t L = s_u L (1 + 1 / F) / 2."""
-    domain, _, facet_tags = bridge.box_mesh(COMM, (6.0, 0.3), (60, 6))
-    cells = np.arange(bridge.original_cells(domain).size, dtype=np.int32)
-    x, height, _ = compute_midpoints(domain, 2, cells).T
-    numbers = np.where(height > 0.1, 3, np.where(x < 3, 1, 2)).astype(np.int32)
-    cell_tags = bridge.name_tags(meshtags(domain, 2, cells, numbers), {"left": 1, "right": 2, "slab": 3})
+    domain, numbers, facet_tags = tagged((6.0, 0.3), (60, 6), lambda x, y: np.where(y > 0.1, 3, np.where(x < 3, 1, 2)))
+    cell_tags = bridge.name_tags(numbers, {"left": 1, "right": 2, "slab": 3})
     clay = mpm.tresca(young=20e6, poisson=0.3, shear_strength=10e3)
     laws = {"left": clay, "right": clay, "slab": mpm.LinearElastic(young=200e6, poisson=0.3)}
     fem = bridge.QuasiStatic(domain, laws, facet_tags, [bridge.fixed(BOTTOM)], cell_tags=cell_tags)
