@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -10,15 +11,20 @@ from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import require_mesh
+from fenics_bridge.errors import agree, require_mesh
 from fenics_bridge.mesh.names import name_tags, names_of, tag_numbers
 from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, owned_cells, require_tags_of, tag_values
+from fenics_bridge.mesh.walls import lines_of, parted, require_along
 from fenics_bridge.types import MeshTags
 from mpm_core.mesh import Tag
 
 
 def soil_mesh(
-    domain: Mesh, cell_tags: MeshTags, facet_tags: MeshTags | None = None, tag: Tag = 1
+    domain: Mesh,
+    cell_tags: MeshTags,
+    facet_tags: MeshTags | None = None,
+    tag: Tag = 1,
+    walls: Iterable[Any] = (),
 ) -> tuple[Mesh, MeshTags, MeshTags]:
     """Mesh of the cells of one tag or several, with a partition of its own, so that the work is distributed over all ranks.
 
@@ -30,13 +36,15 @@ def soil_mesh(
         cell_tags: tags of its cells.
         facet_tags: tags of its facets; None where none is tagged.
         tag: number or name of a soil, or a sequence of them, e.g. ["clay", "fill"].
+        walls: lines (k, 2) [m], or structural members along them, at which the soil on both sides is parted: the water of a
+            `water.Seepage` does not flow through them. The mesh, of triangles, must follow them.
 
     Returns:
         The mesh of the soil, the tags of its cells and those of its facets, which are the tags that they have in the background
         mesh, with their names.
 
     Raises:
-        InputError: no cell has a tag, or tags of other entities or of another mesh. Raised on all ranks alike.
+        InputError: no cell has a tag, tags of other entities or of another mesh, or a wall that the mesh does not follow. Raised on all ranks alike.
     """
     require_mesh(domain)
     dim = domain.topology.dim
@@ -47,8 +55,16 @@ def soil_mesh(
     cells = np.flatnonzero(np.isin(values, numbers))
     nodes = compat.cell_nodes(domain)[cells]
     number, points = _numbered_nodes(domain, nodes)
-    facets, facet_values = _owned_facets_of(domain, cells, facet_tags)
-    arrays = MeshArrays(points, number[nodes], values[cells], number[facets], facet_values)
+    numbers, lines = number[nodes], lines_of(domain.comm, walls)
+    if lines:
+        agree(
+            domain.comm,
+            None if dim == 2 else "walls is given in three dimensions, expected none: they are for triangles",
+        )
+        corners = domain.geometry.x[nodes, :dim]
+        require_along(domain.comm, corners, lines, [f"walls: the line {k}" for k in range(len(lines))])
+        numbers, points = _parted(domain.comm, numbers, corners, lines, points)
+    arrays = MeshArrays(points, numbers, values[cells], *_facets_of(domain, cells, numbers, facet_tags))
     body, body_cells, body_facets = distributed_mesh(domain.comm, arrays, dim)
     for there, here in ((cell_tags, body_cells), (facet_tags, body_facets)):
         name_tags(here, names_of(there))
@@ -80,12 +96,30 @@ def _numbered_nodes(domain: Mesh, nodes: NDArray[np.integer]) -> tuple[Any, ...]
     return np.rint(used.array).astype(np.int64), points
 
 
-def _owned_facets_of(domain: Mesh, cells: NDArray[np.integer], facet_tags: MeshTags) -> tuple[Any, ...]:
-    """Nodes and tags of the tagged facets of the given cells; a facet may be listed by two ranks."""
+def _parted(comm: Any, cells: Any, corners: Any, lines: Any, points: Any) -> tuple[Any, Any]:
+    """Nodes of this rank's cells, doubled along lines, and its part of the coordinates: the last rank has those of the copies."""
+    counts = comm.allgather(len(points))
+    first = sum(counts[: comm.rank])
+    cells, twins = parted(comm, cells, corners, lines, sum(counts))
+    here = (twins >= first) & (twins < first + len(points))
+    copies = np.zeros((len(twins), points.shape[1]))
+    copies[here] = points[twins[here] - first]
+    copies = comm.allreduce(copies)
+    return cells, np.concatenate([points, copies]) if comm.rank == comm.size - 1 else points
+
+
+def _facets_of(
+    domain: Mesh, cells: NDArray[np.integer], numbers: NDArray[np.int64], facet_tags: MeshTags
+) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Nodes and tags of the tagged facets of given cells, whose nodes have these numbers (m, D + 1); two ranks may list a facet."""
     dim = domain.topology.dim
     if facet_tags is None:
         return np.empty((0, dim), np.int64), np.empty(0, np.int32)
     domain.topology.create_connectivity(dim, dim - 1)
-    facets_of_cell = domain.topology.connectivity(dim, dim - 1).array.reshape(-1, dim + 1)
-    keep = np.isin(facet_tags.indices, facets_of_cell[cells])
-    return compat.facet_nodes(domain, facet_tags.indices[keep]), np.array(facet_tags.values[keep], dtype=np.int32)
+    facets = domain.topology.connectivity(dim, dim - 1).array.reshape(-1, dim + 1)[cells]
+    rows, opposite = np.nonzero(np.isin(facets, facet_tags.indices))
+    others = np.array([np.delete(np.arange(dim + 1), k) for k in range(dim + 1)])  # facet k is opposite to node k
+    nodes = np.sort(numbers[rows[:, None], others[opposite]], axis=1)
+    at = np.searchsorted(facet_tags.indices, facets[rows, opposite])
+    _, once = np.unique(nodes, axis=0, return_index=True)
+    return nodes[once], np.array(facet_tags.values[at[once]], dtype=np.int32)

@@ -9,7 +9,7 @@ from fenics_bridge.water.particles import WATERLESS, apply_reservoirs, waterless
 from fenics_bridge.water.retention import AlwaysSaturated, FreeSurface, Gardner, Tabulated, VanGenuchten
 from fenics_bridge.water.seepage import Seepage
 from fenics_bridge.water.soils import PorousSoil, dipping
-from fenics_bridge.water.standing import ground_lines, standing_water
+from fenics_bridge.water.standing import ground_lines, reservoir_pressure, standing_water
 
 __all__ = [
     "AlwaysSaturated",
@@ -32,6 +32,7 @@ __all__ = [
     "apply_reservoirs",
     "dipping",
     "ground_lines",
+    "reservoir_pressure",
     "standing_water",
     "waterless_facets",
 ]
