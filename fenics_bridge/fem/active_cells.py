@@ -13,7 +13,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import ufl
 from dolfinx import fem, la
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
@@ -21,13 +20,11 @@ from numpy.typing import NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree, real_numbers
-from fenics_bridge.fem.fields import assembled
-from fenics_bridge.fem.geometry import weighted
-from fenics_bridge.fem.loads import LoadVectors, pressing
-from fenics_bridge.fem.supports import Constraints, held_components
+from fenics_bridge.fem.loads import LoadVectors
+from fenics_bridge.fem.pore_water import prescribed_water, water_forces
+from fenics_bridge.fem.supports import Constraints
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.mesh.tagged import owned_cells, tag_values
-from fenics_bridge.types import OfPosition
 
 
 def switch_off(model: Any) -> None:
@@ -43,15 +40,16 @@ def reconfigure(
     off = model.off if off is None else off
     off = tag_numbers(domain.comm, model.cell_tags, off, "off", "cell") if len(off) else ()
     there = cells_there(domain, model.cell_tags, off)
-    water = model._water if pore_pressure is None else _nodal_pressure(domain, pore_pressure)
+    active = there if off else None
+    installed = model.members if members is None else members
+    prepared = model._prepared_members(installed, active)
+    water = model._water if pore_pressure is None else prescribed_water(domain, pore_pressure, installed, there)
     law = law if law is not None else model.law
     laws = model._materials.laws(law)
     was_off = np.zeros(points.n, dtype=bool)
     was_off[points.off] = True
     new = was_off & np.repeat(there.x.array[points.cells] > 0, points.per_cell)
     given = given_stress(model, stress, new)
-    active = there if off else None
-    prepared = model._prepared_members(model.members if members is None else members, active)
     points.assign(np.where(there.x.array[: owned_cells(domain)] > 0, model._materials.number, -1), len(laws))
     take_over(model, new, laws, before, given)
     model.law, model.off = law, off
@@ -61,7 +59,7 @@ def reconfigure(
     model._change_members(prepared)
     model._water = water
     if water is not None:
-        model._loads.constant = _seepage_forces(space, water, there, model.radius)
+        model._loads.constant = water_forces(space, water, there, model.radius)
     old = replace(model._loads.resolved(model.load), displacement=0.0, held=0.0)
     model._loads.held = model._internal_forces() - model._loads.forces(old)
     model.load = replace(old, held=1.0)
@@ -120,57 +118,6 @@ def lonely_nodes(space: Any, there: Any) -> NDArray[np.int32]:
     count.array[compat.cell_dofs(space)[:n][on].ravel()] = 1.0
     compat.add_shared(count)
     return np.flatnonzero(count.array == 0).astype(np.int32)
-
-
-def _nodal_pressure(domain: Mesh, pore_pressure: Any) -> Any:
-    """Pore pressure [Pa] as a function that is linear in each cell."""
-    problem = f"pore_pressure is {pore_pressure!r}, expected a function of positions, such as hydrostatic(2.0)"
-    agree(domain.comm, None if callable(pore_pressure) else problem)
-    dim = domain.geometry.dim
-    p = fem.Function(compat.function_space(domain, "Lagrange", 1), name="pore_pressure")
-    x = p.function_space.tabulate_dof_coordinates()[:, :dim]
-    p.x.array[:] = pressures_at(domain.comm, pore_pressure, x)
-    return p
-
-
-def pressures_at(
-    comm: MPI.Comm, pressure: OfPosition, x: NDArray[np.float64], name: str = "pore_pressure"
-) -> NDArray[np.float64]:
-    """Pressures (n,) [Pa] at positions (n, D) [m]; raises InputError, on all ranks, for other values. Collective."""
-    given = real_numbers(comm, name, pressure(x))
-    good = given.shape in ((), (len(x),))
-    agree(comm, None if good else f"{name} gives values of shape {given.shape}, expected ({len(x)},)")
-    agree(comm, None if np.all(np.isfinite(given)) else f"{name} gives values that are not finite")
-    return np.broadcast_to(given, len(x))
-
-
-def _seepage_forces(space: Any, p: Any, there: Any, radius: Any) -> Any:
-    """Forces -grad p of the pore water on the skeleton; by them water also presses on the surface where it stands on it.
-
-    By Gauss' theorem: the integral of p div v over the active cells, less that of p n v over their surface. Suction does not pull
-    at the surface, so that its part of the second integral is taken out again.
-    """
-    test, normal, suction = ufl.TestFunction(space), ufl.FacetNormal(space.mesh), ufl.min_value(p, 0.0)
-    outward = there("+") * normal("+") + there("-") * normal("-")  # between two cells that are there it cancels
-    form = -weighted(there * ufl.inner(ufl.grad(p), test), radius) * ufl.dx
-    form += weighted(there * suction * ufl.inner(normal, test), radius) * ufl.ds
-    form += weighted(suction("+") * ufl.inner(outward, test("+")), radius) * ufl.dS
-    return assembled(fem.form(form), space).array.copy()
-
-
-def water_on_supports(model: Any, facet_tag: int | str) -> NDArray[np.float64]:
-    """Force (D,) of the pore water on the supports at the facets of a tag, in the components that they hold. Collective."""
-    domain, space, p = model.domain, model.displacement.function_space, model._water
-    dim, own, force = domain.geometry.dim, space.dofmap.index_map.size_local, np.zeros(domain.geometry.dim)
-    if p is None:
-        return force
-    held = held_components(domain, model.facet_tags, model.supports)
-    pressure, test = weighted(p - ufl.min_value(p, 0.0), model.radius), ufl.TestFunction(space)
-    for number in tag_numbers(domain.comm, model.facet_tags, facet_tag, "facet_tag"):
-        if number in held:
-            form = pressing(domain, pressure, test, model.facet_tags, number, model._loads.active)
-            force -= held[number] * assembled(fem.form(form), space).array.reshape(-1, dim)[:own].sum(axis=0)
-    return domain.comm.allreduce(force)
 
 
 def free_motions(model: Any) -> list[str]:

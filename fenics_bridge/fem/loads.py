@@ -153,9 +153,9 @@ def pressing(domain: Mesh, pressure: Any, test: Any, facet_tags: MeshTags, tags:
     normal, ds = ufl.FacetNormal(domain), ufl.Measure("ds", domain=domain, subdomain_data=pressed)(1)
     if there is None:
         return -pressure * ufl.inner(normal, test) * ds
-    outward = there("+") * normal("+") + there("-") * normal("-")  # between two cells that are there it cancels
-    inside = ufl.Measure("dS", domain=domain, subdomain_data=pressed)(1)
-    within = pressure("+") * ufl.inner(outward, test("+")) * inside
+    acting, inside = there * pressure, ufl.Measure("dS", domain=domain, subdomain_data=pressed)(1)
+    outward = acting("+") * normal("+") + acting("-") * normal("-")  # between two cells that are there it cancels
+    within = ufl.inner(outward, test("+")) * inside
     return -there * pressure * ufl.inner(normal, test) * ds - within
 
 

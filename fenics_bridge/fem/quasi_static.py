@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree, require_mesh
-from fenics_bridge.fem.active_cells import reconfigure, water_on_supports
+from fenics_bridge.fem.active_cells import reconfigure
 from fenics_bridge.fem.averaged import AveragedKinematics
 from fenics_bridge.fem.equilibration import EquilibriumReport, find_equilibrium
 from fenics_bridge.fem.equilibrium import Body
@@ -33,6 +33,7 @@ from fenics_bridge.fem.locking import warn_of_laws
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.parameters import set_parameter
 from fenics_bridge.fem.point_functions import PointFunctions
+from fenics_bridge.fem.pore_water import PrescribedWater, water_on_supports
 from fenics_bridge.fem.quadrature import QuadraturePoints
 from fenics_bridge.fem.solver import Solver, given_solver
 from fenics_bridge.fem.supports import Constraints, Support
@@ -121,7 +122,7 @@ class QuasiStatic(ReinforcedBody, SupportedBody, PointFunctions):
         self.supports: tuple[Support, ...] = tuple(supports)
         """The boundary conditions in force"""
         self._loads = LoadVectors(space, facet_tags, cell_tags, radius=self.radius)
-        self._water: fem.Function | None = None  # pore pressure, linear in each cell
+        self._water: PrescribedWater | None = None
         self._members = Members(space)
         self._n_own = space.dofmap.index_map.size_local * space.dofmap.index_map_bs
         self._materials = Materials(domain, law, cell_tags)
@@ -371,7 +372,7 @@ class QuasiStatic(ReinforcedBody, SupportedBody, PointFunctions):
         return self._largest_at_nodes(-1)
 
     def _largest_at_nodes(self, sign: int) -> float:
-        nodal = np.zeros(0) if self._water is None else sign * self._water.x.array
+        nodal = np.zeros(0) if self._water is None else sign * self._water.pressure.x.array
         return max(self.domain.comm.allgather(float(nodal.max(initial=0.0))))
 
     def stress_function(self, smooth: bool = False) -> fem.Function:

@@ -187,7 +187,7 @@ def _take_stress_and_state(model: mpm.Model, fem: Any, search: PointSearch, smoo
         state[:, : values.shape[1]] = values
     if takes_pore_pressure(model, fem):
         if model._core.water is not None:
-            set_pore_pressure(model, fem._water, search)
+            set_pore_pressure(model, fem._water.pressure, search)
         else:
             add_to_stress(model, fem, search, smooth, stress, state)
     if isinstance(fem, Consolidation):

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import mpm_core as mpm
 from fenics_bridge.errors import agree
-from fenics_bridge.fem.active_cells import pressures_at
+from fenics_bridge.fem.pore_water import pressures_at
 from fenics_bridge.types import OfPosition
 from mpm_core import Geometry
 

@@ -81,7 +81,8 @@ def add_to_stress(
     Raises:
         InputError: particles of other laws are under pore pressures. Raised on all ranks alike, before anything changes.
     """
-    water = fem._water if smooth else cell_function(fem.domain, ufl.as_vector([fem._water]), 0, "pore_pressure")
+    nodal = fem._water.pressure
+    water = nodal if smooth else cell_function(fem.domain, ufl.as_vector([nodal]), 0, "pore_pressure")
     pressure = search.values(water)[:, 0]
     agree(model.comm, _drained_mistake(model, pressure, 1e-6 * fem.largest_pore_pressure()))
     for number, law in enumerate(model.laws):
@@ -106,9 +107,9 @@ def _drained_mistake(model: mpm.Model, pressure: NDArray[Any], least: float) -> 
 
 def stands_on_surface(fem: QuasiStatic) -> bool:
     """Whether pore pressures act at the boundary where nothing holds the soil, as under free water. Collective."""
-    domain, water = fem.domain, fem._water
-    if water is None:
+    if fem._water is None:
         return False
+    domain, water = fem.domain, fem._water.pressure
     at_node = np.zeros(len(domain.geometry.x))
     at_node[compat.cell_nodes(domain)] = water.x.array[compat.cell_dofs(water.function_space)]
     facets = exterior_facet_indices(domain.topology)

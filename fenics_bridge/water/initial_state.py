@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_bridge.errors import agree
-from fenics_bridge.fem.active_cells import pressures_at
+from fenics_bridge.fem.pore_water import pressures_at
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.water.seepage import Seepage

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.errors import real_numbers
-from fenics_bridge.fem.active_cells import pressures_at
+from fenics_bridge.fem.pore_water import pressures_at
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.types import OfPosition
 

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree, is_finite, require_mesh
-from fenics_bridge.fem.active_cells import pressures_at
+from fenics_bridge.fem.pore_water import pressures_at
 from fenics_bridge.types import MeshTags, OfPosition
 from fenics_bridge.views import body_text
 from fenics_bridge.water.applied import AppliedBoundary

@@ -58,6 +58,8 @@ class Member:
     """Whether a beam cannot turn at its first point, as on an axis of symmetry"""
     clamped_end: bool = False
     """Whether a beam cannot turn at its last point"""
+    impervious: bool = False
+    """Whether water does not flow through a beam, so that pore pressures may differ on both sides of it"""
 
     @property
     def dim(self) -> int:
@@ -186,6 +188,7 @@ def beam(
     spacing: float | None = None,
     clamped_start: bool = False,
     clamped_end: bool = False,
+    impervious: bool = False,
 ) -> Member:
     """A beam that bends with the soil: a sheet-pile or diaphragm wall, a row of piles, the lining of a tunnel. Plane strain only.
 
@@ -203,6 +206,8 @@ def beam(
         clamped_start: whether it cannot turn at its first point: where a raft or a lining is cut by an axis of symmetry. Clamped ends
             are for finite elements.
         clamped_end: whether it cannot turn at its last point.
+        impervious: whether it holds back water: pore pressures that are prescribed to finite elements are taken on both sides of it,
+            and what differs acts on it. Meshes must follow it then.
 
     Raises:
         InputError: a value is out of range.
@@ -212,7 +217,8 @@ def beam(
     """
     bending_stiffness = float(positive("bending_stiffness", bending_stiffness, "N m2/m"))
     return _made(points, axial_stiffness, bending_stiffness=bending_stiffness, plastic_moment=plastic_moment,
-                 bond_strength=bond_strength, spacing=spacing, clamped_start=clamped_start, clamped_end=clamped_end)  # fmt: skip
+                 bond_strength=bond_strength, spacing=spacing, clamped_start=clamped_start, clamped_end=clamped_end,
+                 impervious=impervious)  # fmt: skip
 
 
 def _made(points: Any, axial_stiffness: float, **values: Any) -> Member:
@@ -229,7 +235,7 @@ def _made(points: Any, axial_stiffness: float, **values: Any) -> Member:
         )
     for name in ("tensile_strength", "compressive_strength", "plastic_moment", "bond_strength"):
         values[name] = within(name, values.get(name, math.inf), 0.0, math.inf)
-    for name in ("fixed_end", "connected", "clamped_start", "clamped_end"):
+    for name in ("fixed_end", "connected", "clamped_start", "clamped_end", "impervious"):
         values[name] = bool(flag(name, values.get(name, False)))
     if values.get("spacing") is not None:
         values["spacing"] = float(positive("spacing", values["spacing"], "m"))

@@ -1,0 +1,194 @@
+"""Walls that hold water back: flow around a sheet pile against its closed form, and the force of the water on walls."""
+
+import numpy as np
+import pytest
+from dolfinx.mesh import compute_midpoints, meshtags
+from mpi4py import MPI
+from scipy.special import ellipk
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import water
+
+pytestmark = [pytest.mark.filterwarnings("ignore:the beam 'wall' " + text) for text in ("ends at", "is as stiff as")]
+
+COMM = MPI.COMM_WORLD
+LEFT, RIGHT, BOTTOM, TOP = 1, 2, 3, 4
+DEPTH, LENGTH, GAMMA = 10.0, 40.0, 9810.0
+SAND = water.PorousSoil(conductivity=1e-5, porosity=0.4)
+
+SHEET_PILE = """
+SetFactory("OpenCASCADE");
+DefineConstant[ cell_size = 1, pile = 5 ];
+Rectangle(1) = {-40, 0, 0, 80, 10};
+Point(100) = {0, 10, 0};
+Point(101) = {0, 10 - pile, 0};
+Line(100) = {100, 101};
+BooleanFragments{ Surface{1}; Delete; }{ Curve{100}; Delete; }
+Physical Surface("soil") = {Surface{:}};
+e = 1e-3;
+Physical Curve("upstream") = {Curve In BoundingBox{-40 - e, 10 - e, -e, e, 10 + e, e}};
+Physical Curve("downstream") = {Curve In BoundingBox{-e, 10 - e, -e, 40 + e, 10 + e, e}};
+Physical Curve("pile") = {Curve In BoundingBox{-e, 10 - pile - e, -e, e, 10 + e, e}};
+Mesh.MeshSizeMax = cell_size;
+"""
+
+
+def sheet_pile(tmp_path, cell_size=1.0, pile=5.0, walls=None):
+    (tmp_path / "pile.geo").write_text(SHEET_PILE)
+    mesh = bridge.read_mesh(tmp_path / "pile.geo", COMM, parameters={"cell_size": cell_size, "pile": pile})
+    return bridge.soil_mesh(*mesh, tag="soil", walls=[[(0, DEPTH), (0, DEPTH - pile)]] if walls is None else walls)
+
+
+def flow_around(mesh, degree=2):
+    body, _, facets = mesh
+    boundary = [water.Reservoir("upstream", DEPTH + 1.0), water.Reservoir("downstream", DEPTH)]
+    flow = water.Seepage(body, SAND, facets, boundary, degree=degree)
+    flow.solve()
+    return flow
+
+
+@pytest.mark.parametrize("pile", [2.5, 5.0, 7.5])
+def test_the_flow_below_a_sheet_pile_has_its_closed_form(tmp_path, pile):
+    """q / (k H) = K' / 2 K of the modulus sin(pi s / 2 T), in a layer of the depth T without an end (Harr 1962, section 5-5)."""
+    parameter = np.sin(np.pi * pile / (2 * DEPTH)) ** 2
+    exact = ellipk(1 - parameter) / (2 * ellipk(parameter))
+    errors = []
+    for cell_size in (1.0, 0.5):
+        flow = flow_around(sheet_pile(tmp_path, cell_size, pile))
+        assert flow.inflow("upstream") == pytest.approx(-flow.inflow("downstream"), rel=1e-9)
+        errors.append(flow.inflow("upstream") / SAND.conductivity / exact - 1)
+    assert 0 < errors[1] < 0.6 * errors[0] < 0.02  # the flow is singular at the tip: first order
+    # By symmetry the head below the pile is the mean of both, and those beside it are as far from it on both sides.
+    heads = flow.pore_pressure()(np.array([[0.0, 1.0], [-1e-3, 9.0], [1e-3, 9.0]])) / GAMMA + (1.0, 9.0, 9.0) - DEPTH
+    assert heads[0] == pytest.approx(0.5, abs=2e-3)
+    assert heads[1] + heads[2] == pytest.approx(1.0, abs=2e-3) and heads[1] > heads[2] + 0.15
+
+
+def test_a_wall_parts_its_nodes_and_keeps_tags(tmp_path):
+    whole, parted = sheet_pile(tmp_path, walls=[]), sheet_pile(tmp_path)
+    n = [mesh.geometry.index_map().size_global for mesh, _, _ in (whole, parted)]
+    assert n[1] == n[0] + 5  # those of the pile but for its tip
+    count = lambda tags, name: len(tags.find(bridge.names_of(tags)[name][0]))
+    for name in ("upstream", "downstream"):
+        assert count(parted[2], name) == count(whole[2], name) == 40
+    assert count(parted[2], "pile") == 2 * count(whole[2], "pile") == 10  # the facets of both sides
+    assert flow_around(whole).inflow("upstream") > 3 * flow_around(parted).inflow("upstream")
+
+
+def test_a_wall_from_side_to_side_parts_the_water():
+    mesh = bridge.box_mesh(COMM, (4.0, 4.0), (8, 8))
+    ring = [(1, 1), (3, 1), (3, 3), (1, 3), (1, 1)]
+    body, _, _ = bridge.soil_mesh(*mesh, tag=bridge.BODY, walls=[ring])
+    assert body.geometry.index_map().size_global == mesh[0].geometry.index_map().size_global + 16
+    half = bridge.soil_mesh(*mesh, tag=bridge.BODY, walls=[[(2.0, 0.0), (2.0, 4.0)]])
+    flow = water.Seepage(half[0], SAND, half[2], [water.Head(LEFT, 6.0), water.Head(RIGHT, 5.0)])
+    flow.solve()
+    assert np.allclose(flow.pore_pressure()(np.array([[1.9, 1.0], [2.1, 1.0]])), GAMMA * np.array([5.0, 4.0]))
+    assert abs(flow.inflow(LEFT)) < 1e-15
+
+
+@pytest.mark.parametrize(
+    ("walls", "message"),
+    [
+        ([[(1.1, 0.0), (1.1, 2.0)]], r"walls: the line 0 goes through a cell at \(1.1, "),
+        ([[(1.0, 0.0), (1.0, 1.7)]], r"walls: the line 0 has the point \(1, 1.7\) m between the nodes of the mesh"),
+        ([[(1.0, 0.0)]], "expected two or more finite points"),
+        ([[(1.0, 0.0), (1.0, np.nan)]], "expected two or more finite points"),
+        ([[(1.0, 0.0, 0.0), (1.0, 1.0, 0.0)]], "expected two or more finite points"),
+        (mpm.beam([(1.0, 0.0), (1.0, 2.0)], 1e9, 1e6), "expected a list of lines"),
+        (3.0, "expected a list of lines"),
+    ],
+)
+def test_walls_that_are_no_lines_of_the_mesh_are_refused(walls, message):
+    mesh = bridge.box_mesh(COMM, (4.0, 4.0), (8, 8))
+    with pytest.raises(mpm.InputError, match=message):
+        bridge.soil_mesh(*mesh, tag=bridge.BODY, walls=walls)
+
+
+# --- the force of water on walls -------------------------------------------------------------------------------------
+
+LAW = mpm.LinearElastic(young=1e6, poisson=0.25)
+MODULUS = 1e6 * 0.75 / (1.25 * 0.5)  # E (1 - nu) / ((1 + nu) (1 - 2 nu))
+
+
+def halves(degree=2, impervious=True):
+    """Two blocks, 2 m long each, on rollers, with a wall between them that has next to no stiffness; and their tags."""
+    domain, _, facet_tags = bridge.box_mesh(COMM, (4.0, 1.0), (8, 2))
+    cells = np.arange(bridge.original_cells(domain).size, dtype=np.int32)
+    right = compute_midpoints(domain, 2, cells)[:, 0] > 2.0
+    tags = meshtags(domain, 2, cells, np.where(right, 2, 1).astype(np.int32))
+    supports = [
+        bridge.roller(LEFT, (1, 0)),
+        bridge.roller(RIGHT, (1, 0)),
+        bridge.roller(BOTTOM, (0, 1)),
+        bridge.roller(TOP, (0, 1)),
+    ]
+    fem = bridge.QuasiStatic(domain, LAW, facet_tags, supports, degree, cell_tags=tags)
+    wall = mpm.beam([(2.0, 0.0), (2.0, 1.0)], 1e-3, 1e-3, spacing=0.5, impervious=impervious)
+    return fem, {"wall": wall}
+
+
+def stepped(left, right):
+    return lambda x: np.where(x[:, 0] < 2.0, left, right)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_wall_moves_by_the_difference_of_the_pressures_beside_it(degree):
+    """Both blocks are compressed by the same strain: u = L (p_left - p_right) / 2 M; the supports carry total stresses."""
+    fem, members = halves(degree)
+    fem.reconfigure(members=members, pore_pressure=stepped(20e3, 8e3))
+    fem.solve(bridge.Load())
+    moved = fem.member_forces("wall").displacement
+    assert np.allclose(moved[:, 0], 2.0 * 12e3 / (2 * MODULUS), rtol=1e-8)
+    assert fem.reaction(LEFT)[0] == pytest.approx(-(20e3 - 6e3), rel=1e-8)  # the pressure less the effective tension
+    assert fem.reaction(RIGHT)[0] == pytest.approx(8e3 + 6e3, rel=1e-8)
+
+
+@pytest.mark.parametrize("beside", [0.0, 8e3])
+def test_the_exposed_face_of_a_wall_has_the_water_of_the_pit(beside):
+    """u = L (p - p_pit) / M."""
+    fem, members = halves()
+    fem.reconfigure(off=[2], members=members, pore_pressure=stepped(20e3, beside))
+    fem.solve(bridge.Load())
+    expected = 2.0 * (20e3 - beside) / MODULUS
+    assert np.allclose(fem.member_forces("wall").displacement[:, 0], expected, rtol=1e-8)
+    # A later change of the soil keeps the pressures, and so does one that takes the wall away.
+    fem.reconfigure(members={})
+    fem.solve(bridge.Load())
+    moved = fem.evaluate_at(np.array([[2.0, 0.5]]))["displacement"][0, 0]
+    assert moved == pytest.approx(expected, rel=1e-8)
+
+
+def test_water_stands_before_a_wall_that_lets_it_through():
+    """The water that presses on the exposed face from outside balances that in the pores."""
+    fem, members = halves(impervious=False)
+    fem.reconfigure(off=[2], members=members, pore_pressure=lambda x: np.full(len(x), 20e3))
+    fem.solve(bridge.Load())
+    assert np.allclose(fem.member_forces("wall").displacement, 0.0, atol=1e-12)
+
+
+def test_the_outer_face_of_a_wall_at_the_boundary_is_dry():
+    domain, cell_tags, facet_tags = bridge.box_mesh(COMM, (2.0, 1.0), (4, 2))
+    supports = [bridge.roller(LEFT, (1, 0)), bridge.roller(BOTTOM, (0, 1)), bridge.roller(TOP, (0, 1))]
+    fem = bridge.QuasiStatic(domain, LAW, facet_tags, supports, cell_tags=cell_tags)
+    wall = mpm.beam([(2.0, 0.0), (2.0, 1.0)], 1e-3, 1e-3, spacing=0.5, impervious=True)
+    fem.reconfigure(members={"wall": wall}, pore_pressure=lambda x: np.full(len(x), 20e3))
+    fem.solve(bridge.Load())
+    assert np.allclose(fem.member_forces("wall").displacement[:, 0], 2.0 * 20e3 / MODULUS, rtol=1e-8)
+
+
+def test_suction_beside_a_wall_acts_on_it():
+    fem, members = halves()
+    fem.reconfigure(off=[2], members=members, pore_pressure=stepped(-5e3, 0.0))
+    fem.solve(bridge.Load())
+    assert np.allclose(fem.member_forces("wall").displacement[:, 0], -2.0 * 5e3 / MODULUS, rtol=1e-8)
+
+
+def test_an_impervious_wall_beside_the_mesh_is_refused_where_there_is_water():
+    fem, _ = halves()
+    wall = {"wall": mpm.beam([(2.2, 0.0), (2.2, 1.0)], 1e6, 1e6, spacing=0.5, impervious=True)}
+    with pytest.raises(mpm.InputError, match=r"members: the impervious wall 'wall' goes through a cell at \(2.2, "):
+        fem.reconfigure(members=wall, pore_pressure=stepped(1e3, 0.0))
+    assert not fem.members
+    fem.reconfigure(members=wall)  # without water it may be anywhere
