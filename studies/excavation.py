@@ -109,6 +109,7 @@ def main(arguments: list[str] | None = None) -> int:
         "wall_seconds": perf_counter() - start,
     }  # fmt: skip
     shown = {"stages_displacement": "The soil after each stage, by its displacement, with the water table where there is one",
+                "stages_flow": "Steady flow of the water around the walls: total head, flow lines and water table",
                 "stages_strain": "The soil after each stage, by the strain accumulated since the displacements were reset",
                 "movements": "Largest movements after each stage", **captions(run.forces)}  # fmt: skip
     said = "\n".join(

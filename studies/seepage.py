@@ -28,7 +28,6 @@ from common.summary import write_summary
 from common.water_site import DAY, WaterSite, read_water_site, time_in_words
 from mpi4py import MPI
 
-import fenics_bridge as bridge
 from fenics_bridge import water
 from fenics_bridge.compat import cell_dofs
 
@@ -71,8 +70,7 @@ class Files(FieldFiles):
     def frame(self) -> None:
         """Add pressure, head and velocity to the files for ParaView. Collective."""
         flow = self._flow
-        there = bridge.evaluate_at(self.points, p=flow.pressure_head, s=flow.saturation())
-        head, saturation = there["p"][:, 0], there["s"][:, 0]
+        head, saturation = self.at_points(flow.pressure_head), self.at_points(flow.saturation())
         velocity = flow.velocity()
         dofs = cell_dofs(velocity.function_space)[: self.n_cells]
         means = velocity.x.array.reshape(-1, flow.domain.geometry.dim)[dofs].mean(axis=1)
@@ -85,8 +83,9 @@ class Files(FieldFiles):
 
 
 def follow(
-    a: Namespace, flow: water.Seepage, files: Files, pictures: list[FlowPicture | None], film: list[FlowPicture | None]
-) -> str | None:
+    a: Namespace, walls: list[np.ndarray], flow: water.Seepage, files: Files, pictures: list[FlowPicture | None],
+    film: list[FlowPicture | None],
+) -> str | None:  # fmt: skip
     """The flow in time, with steps as long as Newton's method takes well. Returns why it ended early, if it did. Collective."""
     end = DAY * a.days
     steps = FlowSteps(flow, end)
@@ -95,7 +94,7 @@ def follow(
         def made() -> None:
             files.row()
             if a.film and flow.time >= end * len(film) / FILM_FRAMES:
-                film.append(flow_picture(flow, f"After {time_in_words(flow.time)}"))
+                film.append(flow_picture(flow, f"After {time_in_words(flow.time)}", members=walls))
             progress.show(flow.time / DAY, len(files.history))
 
         for frame in np.linspace(0.0, end, a.frames + 1)[1:]:
@@ -103,7 +102,7 @@ def follow(
             if stopped:
                 return stopped
             files.frame()
-            pictures.append(flow_picture(flow, f"After {time_in_words(flow.time)}"))
+            pictures.append(flow_picture(flow, f"After {time_in_words(flow.time)}", members=walls))
     return None
 
 
@@ -160,13 +159,13 @@ def main(arguments: list[str] | None = None) -> int:
     flow.solve()
     steady = {name: DAY * flow.inflow(name) for name in names}
     dry = warn_of_suction(flow, site.soils, site.cell_tags, a.site)
-    pictures, stopped = [flow_picture(flow, "Steady flow at the beginning")], None
+    pictures, stopped = [flow_picture(flow, "Steady flow at the beginning", members=site.walls)], None
     film = pictures[:1]
     with Files(flow, names, folder) as files:
         files.row()
         files.frame()
         if site.varies:
-            stopped = follow(a, flow, files, pictures, film)
+            stopped = follow(a, site.walls, flow, files, pictures, film)
             if not dry:
                 warn_of_suction(flow, site.soils, site.cell_tags, a.site)
     summary = {

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import ufl
 from dolfinx.fem import Function
 from dolfinx.mesh import exterior_facet_indices
 from numpy.typing import NDArray
@@ -14,7 +13,6 @@ import mpm_core as mpm
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.evaluate import PointSearch
-from fenics_bridge.fem.fields import cell_function
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.transfer.moved import cell_gradient
@@ -81,8 +79,7 @@ def add_to_stress(
     Raises:
         InputError: particles of other laws are under pore pressures. Raised on all ranks alike, before anything changes.
     """
-    nodal = fem._water.pressure
-    water = nodal if smooth else cell_function(fem.domain, ufl.as_vector([nodal]), 0, "pore_pressure")
+    water = fem._water.pressure if smooth else fem.pore_pressure_function()
     pressure = search.values(water)[:, 0]
     agree(model.comm, _drained_mistake(model, pressure, 1e-6 * fem.largest_pore_pressure()))
     for number, law in enumerate(model.laws):

@@ -5,6 +5,7 @@ from fenics_bridge.water.consolidation import Consolidation
 from fenics_bridge.water.consolidation_step import ConsolidationReport
 from fenics_bridge.water.coupled import Element
 from fenics_bridge.water.motion import Newmark
+from fenics_bridge.water.exit_gradient import exit_gradient
 from fenics_bridge.water.particles import WATERLESS, apply_reservoirs, waterless_facets
 from fenics_bridge.water.retention import AlwaysSaturated, FreeSurface, Gardner, Tabulated, VanGenuchten
 from fenics_bridge.water.seepage import Seepage
@@ -31,6 +32,7 @@ __all__ = [
     "WATERLESS",
     "apply_reservoirs",
     "dipping",
+    "exit_gradient",
     "ground_lines",
     "reservoir_pressure",
     "standing_water",

@@ -97,6 +97,8 @@ class Seepage:
         """Mesh of the body"""
         self.unit_weight = given.unit_weight
         """Unit weight of water [N/m3]"""
+        self.facet_tags = facet_tags
+        """Tags of the boundary"""
         self.water_modulus = given.modulus
         """Bulk modulus of water [Pa]"""
         self.time = 0.0

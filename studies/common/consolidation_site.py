@@ -38,10 +38,10 @@ from .consolidation_stages import GroundStage, Table, pressure_table, stages_of
 from .checks import say
 from .site_doubts import warn_of_reservoirs
 from .site_file import CHANGES, Site, part_of_mesh, site_of, warn_of_members
+from .site_flow import boundary_of, wet_soils
 from .site_keys import DAY, changes_of
 from .slope_case import GRAVITY
 from .water_site import (
-    boundary_of,
     by_law,
     corners_of,
     directions_of,
@@ -49,7 +49,6 @@ from .water_site import (
     read_water_table,
     times_of,
     vertical_conductivity,
-    wet_soils,
 )
 
 BALANCED = 1e-9

@@ -11,8 +11,8 @@ import numpy as np
 
 import mpm_core as mpm
 
+from .site_flow import boundaries_of_stage
 from .site_keys import DAY, require_push
-from .water_site import condition
 
 Table = tuple[tuple[float, float], ...]
 
@@ -101,7 +101,7 @@ def stages_of(
     begins = bool(given) and "day" not in given[0]
     later = {soil for fill in names[begins:] for soil in fill}
     off = tuple(soil for soil in soils if (soil not in names[0] if begins else soil in later))
-    changed = _boundary_of(given[0], f"{where}[0]") if begins else {}
+    changed = boundaries_of_stage(given[0], f"{where}[0]") if begins else {}
     stages = [GroundStage("beginning", 0.0, 0.0, off, {**boundary, **changed})]
     for k, row in list(enumerate(given))[begins:]:
         stages.append(_stage(row, stages[-1], soils, f"{where}[{k}]", first=len(stages) == 1))
@@ -124,11 +124,7 @@ def _stage(row: dict, before: GroundStage, soils: Sequence[str], where: str, fir
             raise mpm.InputError(f"{where}: {soil!r} is {'not ' if soil in before.off else ''}there before this stage")
     off = tuple(soil for soil in soils if (soil in before.off or soil in gone) and soil not in fill)
     name = str(row.get("name", ", ".join((*fill, *gone))))
-    return GroundStage(name, DAY * day, DAY * duration, off, {**before.boundary, **_boundary_of(row, where)})
-
-
-def _boundary_of(row: Mapping[str, Any], where: str) -> dict[str, Any]:
-    return {name: condition(name, one, f"{where}.boundaries.{name}") for name, one in row.get("boundaries", {}).items()}
+    return GroundStage(name, DAY * day, DAY * duration, off, {**before.boundary, **boundaries_of_stage(row, where)})
 
 
 def _names(row: Mapping[str, Any], key: str, where: str) -> list[str]:

@@ -66,7 +66,9 @@ class Field:
 
 
 def gathered(function: object, half_section: bool = False, parts: int = 1) -> Field | None:
-    """A continuous function of DOLFINx at the corners of triangles; None but on the first rank. Collective.
+    """A function of DOLFINx at the corners of triangles; None but on the first rank. Collective.
+
+    It is continuous, but where the mesh has several nodes at one place, as along walls in the flow of water.
 
     half_section: of an axisymmetric body, which the axes of pictures then say; parts: into which each side of a cell is divided
     """
@@ -75,16 +77,32 @@ def gathered(function: object, half_section: bool = False, parts: int = 1) -> Fi
     own = mesh["cells"][mesh["cell_owners"] == comm.rank]
     shapes, triangles = _divided(parts)
     nodes = np.einsum("qk,ckd->cqd", shapes, mesh["points"][own])
-    values = bridge.evaluate_at(nodes.reshape(-1, 2), value=function)["value"].reshape(*nodes.shape[:2], -1)
-    found = comm.gather((nodes[:, triangles].reshape(-1, 2), values[:, triangles].reshape(-1, values.shape[2])))
+    values = _within_cells(function, nodes)
+    at_corner = shapes.argmax(axis=1)  # of each point, where sides are not divided
+    names = mesh["global_nodes"][own[:, at_corner]] if parts == 1 else np.zeros(nodes.shape[:2], dtype=np.int64)
+    at_triangles = nodes[:, triangles].reshape(-1, 2), values[:, triangles], names[:, triangles].reshape(-1, 1)
+    found = comm.gather(at_triangles)
     if found is None:
         return None
-    corners, at_corners = (np.concatenate(arrays) for arrays in zip(*found))
+    corners, at_corners, names = (np.concatenate(arrays) for arrays in zip(*found))
+    at_corners = at_corners.reshape(len(corners), -1)
     alike = np.round(
         corners / np.ptp(corners, axis=0).max(), 9
     )  # both cells at a side have its points, but for rounding
-    _, first, number = np.unique(alike, axis=0, return_index=True, return_inverse=True)
+    rows = np.concatenate([alike, names], axis=1)
+    _, first, number = np.unique(rows, axis=0, return_index=True, return_inverse=True)
     return Field(corners[first], number.reshape(-1, 3), at_corners[first], half_section)
+
+
+def _within_cells(function: object, points: np.ndarray) -> np.ndarray:
+    """Values (m, q, k) of a function at points (m, q, 2) [m] of each of the m cells that this rank owns, as seen from within it."""
+    m, q, _ = points.shape
+    size = int(np.prod(function.ufl_shape, dtype=int))
+    if not m:  # DOLFINx 0.5 cannot evaluate at none
+        return np.zeros((0, q, size))
+    x = np.zeros((m * q, 3))
+    x[:, :2] = points.reshape(-1, 2)
+    return function.eval(x, np.repeat(np.arange(m, dtype=np.int32), q)).reshape(m, q, size)
 
 
 def mechanism_field(

@@ -23,7 +23,7 @@ from fenics_bridge.water.boundary import value_at
 from .animation import save_figure_film
 from .field_plots import Field, gathered
 from .figures import label_axes, panel_figure, save_figure
-from .plots import ROUND_TICKS, Quantity, paper_style
+from .plots import MEMBER, ROUND_TICKS, Quantity, paper_style
 from .water_table import draw_water_table, polyline_segments, top_with_water, water_legend, zero_line
 
 HEAD = Quantity("Total head", "m", colours="viridis")
@@ -41,6 +41,7 @@ class FlowPicture:
 
     head: pressure head at the corners of all cells [m]; velocity: at the corners too, averaged over cells [m/s]; saturation [-]
     unit_weight: of water [N/m3]; levels: standing water, lines (k, 2) from point to point [m]
+    members: lines (n, 2) of structural members [m]
     """
 
     name: str
@@ -49,16 +50,25 @@ class FlowPicture:
     saturation: np.ndarray
     unit_weight: float
     levels: list[np.ndarray] = field(default_factory=list)
+    members: Sequence[np.ndarray] = ()
 
     def table(self) -> np.ndarray:
         """Water table in the soil, where the pressure is zero, and the surface of standing water: segments (k, 2, 2) [m]."""
-        lines = [polyline_segments(line) for line in self.levels]
-        return np.concatenate([zero_line(self.head.points, self.head.cells, self.head.values[:, 0]), *lines])
+        lines, head = [polyline_segments(line) for line in self.levels], self.head.values[:, 0]
+        head = np.where(
+            np.abs(head) > 1e-9 * np.abs(head).max(), head, 0.0
+        )  # a seepage face has zero but for round-off
+        return np.concatenate([zero_line(self.head.points, self.head.cells, head), *lines])
 
     @property
     def total(self) -> np.ndarray:
         """Total head at the corners [m]."""
         return self.head.values[:, 0] + self.head.points[:, 1]
+
+    @property
+    def moves(self) -> bool:
+        """Whether water moves, beyond the round-off of water at rest."""
+        return float(np.ptp(self.total)) > 1e-6 * float(np.ptp(self.head.points[:, 1]))
 
     def values(self, quantity: Quantity) -> np.ndarray:
         """HEAD, PRESSURE or SATURATION at the corners, as shown."""
@@ -67,18 +77,21 @@ class FlowPicture:
         return self.total if quantity is HEAD else quantity.scale * self.unit_weight * self.head.values[:, 0]
 
 
-def flow_picture(flow: water.Seepage, name: str, reservoirs: Sequence[tuple] = ()) -> FlowPicture | None:
+def flow_picture(
+    flow: water.Seepage, name: str, reservoirs: Sequence[tuple] = (), members: Sequence[np.ndarray] = ()
+) -> FlowPicture | None:
     """The flow as it is now; None but on the first rank. Collective.
 
     Args:
         reservoirs: to be shown: (condition, x, y), with the line of the ground below each.
+        members: lines (n, 2) of structural members [m].
     """
     head, velocity = gathered(flow.pressure_head), gathered(bridge.nodal_average(flow.velocity()))
     saturation = gathered(flow.saturation())
     if head is None or velocity is None or saturation is None:
         return None
     levels = [_level(value_at(condition.level, flow.time), x, y) for condition, x, y in reservoirs]
-    return FlowPicture(name, head, velocity.values, saturation.values[:, 0], flow.unit_weight, levels)
+    return FlowPicture(name, head, velocity.values, saturation.values[:, 0], flow.unit_weight, levels, members)
 
 
 def _level(level: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -173,9 +186,10 @@ def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[n
         axes.tricontourf(triangles, values, levels, cmap=colours, norm=norm, extend="both")
         if np.any((lines > values.min()) & (lines < values.max())):  # matplotlib warns of none
             axes.tricontour(triangles, values, lines, colors="black", linewidths=0.35, alpha=0.6)
-        _flow_lines(axes, triangles, picture, (low, high), fastest, DARK if quantity is PRESSURE else LIGHT)
+        _flow_lines(axes, picture, (low, high), fastest, DARK if quantity is PRESSURE else LIGHT)
         table = draw_water_table(axes, picture.table()) or table
         axes.add_collection(LineCollection(picture.head.outline, colors="black", linewidths=0.8))
+        axes.add_collection(LineCollection(picture.members, colors=MEMBER, linewidths=1.6, capstyle="butt"))
         axes.set_title(picture.name, loc="left", pad=14 if aspect > 1 else 3)  # above marks of the table
     label_axes(panels, ("$x$ [m]", "$y$ [m]"))
     if table:
@@ -186,19 +200,20 @@ def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[n
     return figure
 
 
-def _flow_lines(
-    axes: Axes, triangles: Triangulation, picture: FlowPicture, box: tuple, fastest: float, look: tuple[str, str]
-) -> None:
+def _flow_lines(axes: Axes, picture: FlowPicture, box: tuple, fastest: float, look: tuple[str, str]) -> None:
     """Flow lines through the saturated soil, where water moves at all.
 
     fastest: velocity in all pictures [m/s]; a millionth of it is round-off in water at rest
     look: colours of the lines and of what surrounds them
     """
     low, high = box
+    # Matplotlib looks for the triangle of a point in meshes without two nodes at one place, as those along walls.
+    places, first, number = np.unique(picture.head.points, axis=0, return_index=True, return_inverse=True)
+    triangles = Triangulation(*places.T, number.ravel()[picture.head.cells])
     x, y = (np.linspace(a, b, n) for a, b, n in zip(low, high, (240, 120)))
     grid = np.meshgrid(x, y)
     u, v, p = (LinearTriInterpolator(triangles, values)(*grid)
-               for values in (*picture.velocity.T, picture.head.values[:, 0]))  # fmt: skip
+               for values in (*picture.velocity[first].T, picture.head.values[first, 0]))  # fmt: skip
     speed = np.hypot(u, v)
     if not speed.max() > 1e-6 * fastest:
         return

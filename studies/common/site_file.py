@@ -45,11 +45,14 @@ from .site_doubts import warn_of_depth
 from .site_keys import changes_of, member_of, part_of, read_site_table, require_push
 from .site_laws import is_number, law_at, law_keys, located, unit_doubt, unit_weight_of
 from .slope_case import GRAVITY
+from .stage_flow import with_steady_flow
 
 AIR = ("air", "water", "empty")
 """Groups of a mesh that hold no soil by their names"""
 CHANGES = ("excavate", "law", "unit_weight", "pressure", "support", "release", "install", "remove")
 """What a stage may change beside soils that it places"""
+STAGE_WATER = ("water_level", "steady_flow")
+"""Keys of a stage that give it pore pressures"""
 DEFAULT_SUPPORTS = {"base": "fixed", **dict.fromkeys(("left", "right", "sides", "axis", "far"), "roller")}
 
 
@@ -138,7 +141,7 @@ class Site:
 
     def left_out_at_once(self) -> str:
         """A warning of what stages change beside placing soils, for a study that has all soils at once; else no text."""
-        changes = changes_of(self.stage_rows, (*CHANGES, "water_level"))
+        changes = changes_of(self.stage_rows, (*CHANGES, *STAGE_WATER))
         if not changes:
             return ""
         return (
@@ -177,14 +180,16 @@ def read_site(path: Path, comm: MPI.Comm, cell_size: float | None = None, needed
     table = read_site_table(path, needed)
     _warn_of_water(table, path)
     warn_of_pressures(table, path)
-    return site_of(table, path, comm, cell_size)
+    site = site_of(table, path, comm, cell_size)
+    site.stages = with_steady_flow((site.domain, site.cell_tags, site.facet_tags), site.stages, table, path)
+    return site
 
 
 def _warn_of_water(table: dict[str, Any], path: Path) -> None:
     """Warn of the water of a file for a study that has only that of stages."""
-    if "boundaries" in table and not changes_of(table.get("stages", []), ("water_level",)):
+    if "boundaries" in table and not changes_of(table.get("stages", []), STAGE_WATER):
         say(f"{path}: the water of [boundaries] is left out here, and the soils are without pore pressure; the studies drawdown, "
-            "rain and consolidation have it, or a stage with water_level")  # fmt: skip
+            "rain and consolidation have it, or a stage with water_level or steady_flow = true")  # fmt: skip
 
 
 def warn_of_pressures(table: dict[str, Any], path: Path) -> None:

@@ -53,7 +53,7 @@ MEMBERS: dict[str, Callable] = {"bar": mpm.bar, "strut": mpm.strut, "beam": mpm.
 """Function that makes a structural member of each kind"""
 STAGE_KEYS = (
     "name", "day", "duration", "fill", "excavate", "boundaries", "law", "unit_weight", "pressure", "support", "release",
-    "water_level", "reset_displacement", "install", "remove",
+    "water_level", "steady_flow", "reset_displacement", "install", "remove",
 )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,8 @@ from particle_player import axis_labels, boundary_edges
 from .field_plots import Field, gathered
 from .figures import Pictures, curve_figure, label_axes, panel_figure, save_figure
 from .plots import CURVES, MEMBER, Quantity, paper_style
+from .seepage_plots import FlowPicture, few, flow_picture, save_flow
+from .stage_flow import StageFlow
 from .water_table import draw_water_table, level_line, top_with_water, water_legend
 
 MOVED = Quantity("Displacement", "mm", scale=1e3, colours="viridis")
@@ -32,14 +34,16 @@ class StagePicture:
 
     displacement: at the corners of all cells [m]; there: of each cell; strain: accumulated deviatoric strain of each cell [-]
     water: segments (k, 2, 2) [m] of the water table, none where the site is dry; members: lines (n, 2) [m] of structural ones
+    flow: the steady flow that has the pore pressures; None where a water level has them
     """
 
     name: str
     displacement: Field
     there: np.ndarray
     strain: np.ndarray
-    water: np.ndarray = field(default_factory=lambda: np.empty((0, 2, 2)))
+    water: np.ndarray
     members: Sequence[np.ndarray] = ()
+    flow: FlowPicture | None = None
 
     def field(self) -> Field:
         """The displacement on the cells that are there."""
@@ -56,18 +60,23 @@ def stage_picture(site: bridge.FemSite, name: str) -> StagePicture | None:
     fem, comm = site.fem, site.fem.domain.comm
     moved, pressure = gathered(fem.displacement, fem.geometry == bridge.Geometry.AXISYMMETRIC), site.state.pore_pressure
     parts = comm.gather(tuple(values[:, 0] for values in own_cell_values(fem)))
+    lines, flow = [np.array(member.points) for member in fem.members.values()], None
+    if isinstance(pressure, StageFlow):
+        flow = flow_picture(pressure.flow, f"Stage: {name}", pressure.reservoirs, lines)
     if moved is None or parts is None:
         return None
-    material, strain = (np.concatenate(arrays) for arrays in zip(*parts))
+    material, strain, _ = (np.concatenate(arrays) for arrays in zip(*parts))
     box = moved.points.min(axis=0), moved.points.max(axis=0)
-    water = {"water": level_line(pressure, *box)} if pressure else {}
-    lines = [np.array(member.points) for member in fem.members.values()]
-    return StagePicture(name, moved, material >= 0, strain, members=lines, **water)
+    if flow is not None:
+        table = flow.table()
+    else:
+        table = level_line(pressure, *box) if pressure else np.empty((0, 2, 2))
+    return StagePicture(name, moved, material >= 0, strain, table, lines, flow)
 
 
 def own_cell_values(fem: bridge.QuasiStatic) -> list[np.ndarray]:
-    """Number of the law (-1: not there) and accumulated deviatoric strain of the cells that this rank owns: (m, 1)."""
-    functions = fem.material_function(), fem.deviatoric_strain_function()
+    """Number of the law (-1: not there), accumulated deviatoric strain and pore pressure of the cells that this rank owns: (m, 1)."""
+    functions = fem.material_function(), fem.deviatoric_strain_function(), fem.pore_pressure_function()
     n = bridge.original_cells(fem.domain).size
     return [function.x.array.reshape(-1, 1)[:n].copy() for function in functions]
 
@@ -130,8 +139,12 @@ def stage_pictures(
     curves = {name: [1e3 * row[key] for row in rows] for key, name in
               (("heave_m", "largest heave"), ("settlement_m", "largest settlement"),
                ("sideways_m", "largest horizontal"))}  # fmt: skip
-    names = [row["stage"] for row in rows]
+    names, flows = [row["stage"] for row in rows], [
+        one.flow for one in pictures if one.flow is not None and one.flow.moves
+    ]
+    flowing: Pictures = {"stages_flow": lambda: save_flow(folder / "stages_flow.png", few(flows))} if flows else {}
     return {
+        **flowing,
         "stages_displacement": lambda: save_stages(folder / "stages_displacement.png", pictures, MOVED),
         "stages_strain": lambda: save_stages(folder / "stages_strain.png", pictures, SHEAR),
         "movements": lambda: save_over_stages(folder / "movements.png", names, curves, "Displacement [mm]"),
@@ -148,8 +161,8 @@ class StageFiles:
         self._output = MeshOutput(path, comm, mesh["points"], mesh["cells"][own])
 
     def write(self, number: int) -> None:
-        """Add displacement, stress, material (-1: no soil) and strain as they are after a stage."""
-        material, strain = own_cell_values(self._fem)
+        """Add displacement, stress, pore pressure, material (-1: no soil) and strain as they are after a stage."""
+        material, strain, pressure = own_cell_values(self._fem)
         n = len(material)
         function = self._fem.stress_function()
         stress = function.x.array.reshape(-1, function.ufl_shape[0])[:n]
@@ -158,7 +171,12 @@ class StageFiles:
         else:
             stresses = {"stress": stress}
         moved = bridge.evaluate_at(self._points, displacement=self._fem.displacement)["displacement"]
-        cells = {"material": material[:, 0], "deviatoric_strain": strain[:, 0], **stresses}
+        cells = {
+            "material": material[:, 0],
+            "deviatoric_strain": strain[:, 0],
+            "pore_pressure": pressure[:, 0],
+            **stresses,
+        }
         self._output.write(float(number), {"displacement": moved}, cells)
 
     def __enter__(self) -> StageFiles:

@@ -20,6 +20,7 @@ from .member_results import StageForces, force_row, member_pictures, stage_force
 from .quiet import NOT_REACHED, without_warning
 from .site_file import Site
 from .site_options import add_site_file
+from .stage_flow import flow_row, warn_of_heave
 from .stage_plots import StageFiles, StagePicture, stage_picture, stage_pictures
 
 
@@ -70,7 +71,8 @@ def carry_out(site: Site, degree: int, folder: Path, comm: MPI.Comm, **options: 
             files.write(report.number)
             run.forces.append(stage_forces(run.site, report.name))
             run.rows.append({**movements(run.site), "stage": report.name, "steps": report.steps, "iterations": report.iterations,
-                             "largest_displacement_m": report.largest_displacement, **force_row(run.site.fem.members, run.forces[-1].forces)})  # fmt: skip
+                             "largest_displacement_m": report.largest_displacement, **flow_row(run.site.state.pore_pressure), **force_row(run.site.fem.members, run.forces[-1].forces)})  # fmt: skip
+            warn_of_heave(run.rows[-1], [run.site.state.unit_weight[tag] for tag in run.site.state.there])
             picture = stage_picture(run.site, report.name)
             if picture is not None:
                 run.pictures.append(picture)

@@ -30,9 +30,10 @@ import mpm_core as mpm
 from fenics_bridge import water
 
 from .checks import say
-from .site_doubts import warn_of_flooded_ground, warn_of_flow, warn_of_reservoirs
+from .site_doubts import warn_of_flooded_ground, warn_of_reservoirs
 from .site_file import Site, check_soils, part_of_mesh, site_mesh
-from .site_keys import CONDITIONS, CURVES, DAY, FLOW, UNDRAINED, changes_of, part_of, read_site_table
+from .site_flow import boundary_of, wet_soils
+from .site_keys import DAY, UNDRAINED, changes_of, member_of, read_site_table
 
 
 @dataclass
@@ -40,6 +41,7 @@ class WaterSite:
     """A site of seepage as its file describes it, on its mesh.
 
     soils: {name: PorousSoil}; boundary: of `fenics_bridge.water`; varies: whether any value changes in time
+    walls: lines (n, 2) of the members that hold water back [m]
     """
 
     domain: Any
@@ -48,6 +50,7 @@ class WaterSite:
     soils: dict[str, water.PorousSoil]
     boundary: list
     varies: bool
+    walls: list[np.ndarray]
 
     def seepage(self, degree: int) -> water.Seepage:
         """The flow, at rest, in elements of a degree; reservoirs that change load the soil as well. Collective."""
@@ -122,10 +125,13 @@ def read_water_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) 
     mesh = site_mesh(table, path, comm, cell_size)
     check_soils(table, path, mesh[1])
     wet = {name: soil for name, soil in soils.items() if soil is not None}
-    boundary, body = list(boundary_of(table, path).values()), part_of_mesh(mesh, wet)
+    members = [member_of(given, f"{path}: members.{name}") for name, given in table.get("members", {}).items()]
+    walls = [np.array(member.points) for member in members if member.impervious]
+    body = bridge.soil_mesh(*mesh, tag=list(wet), walls=walls) if walls else part_of_mesh(mesh, wet)
+    boundary = list(boundary_of(table, path).values())
     warn_of_reservoirs(body[0], boundary, path)
     warn_of_flooded_ground(body[0], body[2], boundary, path)
-    return WaterSite(*body, wet, boundary, varies=bool(times_of(boundary)))
+    return WaterSite(*body, wet, boundary, bool(times_of(boundary)), walls)
 
 
 def read_water_table(path: Path, needed: Sequence[str]) -> dict[str, Any]:
@@ -138,64 +144,10 @@ def read_water_table(path: Path, needed: Sequence[str]) -> dict[str, Any]:
     return table
 
 
-def wet_soils(table: dict[str, Any], path: Path, keys: Collection[str] = FLOW) -> dict[str, water.PorousSoil | None]:
-    """The pores of each soil of a file by some keys; None for a soil without any, which holds no water."""
-    found = {}
-    for name, given in table["soils"].items():
-        porous = part_of(given, keys)
-        undrained = set(porous) <= set(UNDRAINED) and given.get("undrained", False)  # its porosity is that of the law
-        found[name] = porous_soil(porous, f"{path}: soils.{name}") if porous and not undrained else None
-    return found
-
-
 def effective_laws(table: dict[str, Any]) -> dict[str, Any]:
     """The file of a site with laws of effective stresses only, for a study that computes the water of the soils."""
     soils = {name: {k: v for k, v in given.items() if k not in UNDRAINED} for name, given in table["soils"].items()}
     return table | {"soils": soils}
-
-
-def boundary_of(table: dict[str, Any], path: Path) -> dict[str, Any]:
-    """The conditions of the water in a file, by boundary."""
-    return {name: condition(name, given, f"{path}: boundaries.{name}") for name, given in table["boundaries"].items()}
-
-
-def porous_soil(given: dict, where: str) -> water.PorousSoil:
-    """The soil that a table of `FLOW` describes; where: it stands, for messages."""
-    for key in given:
-        if key in CURVES and not isinstance(given[key], dict):
-            raise mpm.InputError(f"{where}: {key} is {given[key]!r}, expected a table such as {key} = {{name = value}}")
-        if not _has_numbers(given[key]):
-            raise mpm.InputError(f"{where}: {key} is {given[key]!r}, expected numbers")
-    curves = [key for key in given if key in CURVES]
-    if len(curves) > 1 or "conductivity" not in given:
-        raise mpm.InputError(
-            f"{where} has {', '.join(given) or 'nothing'}, expected conductivity and one retention curve at most"
-        )
-    try:
-        parameters = {key: value for key, value in given.items() if key not in CURVES}
-        if "dip" in parameters:
-            parameters["conductivity"] = _of_strata(given["conductivity"], parameters.pop("dip"))
-        if curves:
-            parameters["retention"] = CURVES[curves[0]](**given[curves[0]])
-        soil = water.PorousSoil(**parameters)
-    except (TypeError, mpm.InputError) as error:
-        raise mpm.InputError(f"{where}: {error}") from None
-    warn_of_flow(soil, where)
-    return soil
-
-
-def _has_numbers(value: Any) -> bool:
-    """Whether a value of a site file, or whatever is in its lists and tables, is a number."""
-    if isinstance(value, (list, dict)):
-        return all(_has_numbers(part) for part in (value.values() if isinstance(value, dict) else value))
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
-def _of_strata(conductivity: Any, dip: float) -> Any:
-    """Tensor of the conductivities along and across strata that dip [degrees] along x."""
-    if not isinstance(conductivity, list) or len(conductivity) != 2:
-        raise mpm.InputError(f"dip: conductivity is {conductivity!r} m/s, expected [along, across] the strata")
-    return water.dipping(*conductivity, dip)
 
 
 def vertical_conductivity(soil: water.PorousSoil) -> float:
@@ -219,35 +171,3 @@ def directions_of(soils: Iterable[water.PorousSoil | None]) -> list | None:
         for soil in soils
     ]
     return factors if any(factor is not None for factor in factors) else None
-
-
-def condition(name: str, given: dict, where: str) -> Any:
-    """The boundary condition that the table of a boundary describes."""
-    if given == {"seepage_face": True}:
-        return water.SeepageFace(name)
-    if len(given) != 1 or next(iter(given)) not in CONDITIONS:
-        raise mpm.InputError(f"{where} has {given}, expected one of {', '.join(CONDITIONS)} or seepage_face = true")
-    key, value = next(iter(given.items()))
-    make, unit = CONDITIONS[key]
-    if isinstance(value, list):
-        if not value or any(not isinstance(row, list) or len(row) != 2 or not _has_numbers(row) for row in value):
-            raise mpm.InputError(f"{where}: {key} is {value!r}, expected a number or rows [days, value]")
-        for (day, _), (later, _) in zip(value, value[1:]):
-            if later <= day:
-                raise mpm.InputError(
-                    f"{where}: {key} has day {later:g} after day {day:g}, expected rows of rising days"
-                )
-        _require_rain(where, key, [number for _, number in value])
-        return make(name, tuple((DAY * float(day), unit * float(number)) for day, number in value))
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise mpm.InputError(f"{where}: {key} is {value!r}, expected a number or rows [days, value]")
-    _require_rain(where, key, [value])
-    return make(name, unit * float(value))
-
-
-def _require_rain(where: str, key: str, values: list[float]) -> None:
-    """Raises InputError, in the units of the file, for rain that would leave the soil."""
-    if key == "rain" and min(values) < 0:
-        raise mpm.InputError(
-            f"{where}: rain is {min(values):g} mm/day, expected 0 or more: rain does not leave the soil"
-        )

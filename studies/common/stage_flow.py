@@ -1,0 +1,152 @@
+"""Pore pressures of stages from steady flow through the soils that are there, around walls that hold the water back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from dolfinx.mesh import exterior_facet_indices, meshtags
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import water
+from fenics_bridge.water.soils import WATER_WEIGHT
+
+from .checks import say
+from .site_doubts import warn_of_reservoirs
+from .site_flow import boundaries_of_stage, boundary_of, wet_soils
+from .site_keys import DAY
+
+
+@dataclass
+class StageFlow:
+    """Steady flow of a stage.
+
+    pressure: function of positions that returns the pore pressures; reservoirs: each with its ground, (condition, x, y) [m]
+    """
+
+    flow: water.Seepage
+    pressure: Any
+    reservoirs: list[tuple]
+
+    def __call__(self, points: np.ndarray) -> Any:
+        """Pore pressures (n,) [Pa] at positions (n, D) [m]; in front of walls those of the reservoirs there. Collective."""
+        return self.pressure(points)
+
+
+def flow_row(pressure: Any) -> dict[str, float]:
+    """Results of a stage of steady flow: what enters at each boundary, and the gradient where water leaves. Collective.
+
+    Args:
+        pressure: pore pressures of the stage; there are results where they are a StageFlow.
+    """
+    if not isinstance(pressure, StageFlow):
+        return {}
+    flow = pressure.flow
+    tags = list(dict.fromkeys(one.facet_tag for one in flow.boundary))
+    inflows = {f"inflow_{tag}_m2_per_day": DAY * flow.inflow(tag) for tag in tags}
+    return {**inflows, "largest_exit_gradient": max(water.exit_gradient(flow, tag) for tag in tags)}
+
+
+def warn_of_heave(row: Mapping[str, Any], unit_weights: Sequence[float]) -> None:
+    """Warn where water leaves with a gradient that lifts soil without cohesion.
+
+    Args:
+        row: results of a stage, with those of `flow_row`.
+        unit_weights: of the soils that are there [N/m3].
+    """
+    gradient, critical = row.get("largest_exit_gradient", 0.0), min(unit_weights) / WATER_WEIGHT - 1
+    if gradient > critical:
+        say(f"stage {row['stage']!r}: water leaves the ground with a gradient of {gradient:.2f}, above the critical one of "
+            f"{critical:.2f} of soil of {min(unit_weights) / 1e3:.3g} kN/m3: it lifts soil without cohesion (hydraulic heave)")  # fmt: skip
+
+
+def with_steady_flow(
+    mesh: tuple[Any, Any, Any], stages: Sequence[bridge.Stage], table: Mapping[str, Any], path: Path
+) -> list[bridge.Stage]:
+    """Stages of a site, with pore pressures of steady flow in those that ask for it by ``steady_flow = true``. Collective.
+
+    Water flows through the soils that are there and have a conductivity, under the conditions of `[boundaries]` and of the stages so
+    far, where these boundaries are at the surface of the soil. It does not flow through members that are impervious.
+
+    Args:
+        mesh: domain, cell tags and facet tags of the site.
+        stages: the stages, of which the last ones are those of the file.
+        table, path: of the file.
+
+    Raises:
+        InputError: a stage asks for it beside a water level, in an axisymmetric site, or without boundaries or soils for it.
+    """
+    rows = table.get("stages", [])
+    if not any("steady_flow" in row for row in rows):
+        return list(stages)
+    pores, boundary = wet_soils(dict(table), path), boundary_of(dict(table), path)
+    there: list[str] = []
+    members: dict[str, mpm.Member] = {}
+    result = list(stages[: len(stages) - len(rows)])
+    for stage in result:
+        there += stage.fill
+    for k, (row, stage) in enumerate(zip(rows, stages[len(result) :])):
+        where = f"{path}: stages[{k}]"
+        there = [soil for soil in (*there, *stage.fill) if soil not in stage.excavate]
+        members = {name: one for name, one in members.items() if name not in stage.remove} | stage.install
+        boundary |= boundaries_of_stage(row, where)
+        if _asks(row, where, table):
+            soils = {soil: pores[soil] for soil in there if pores[soil] is not None}
+            walls = [member for member in members.values() if member.impervious]
+            if not boundary or not soils:
+                lacks = "no soil with a conductivity is there" if boundary else "the file has no [boundaries.NAME]"
+                raise mpm.InputError(f"{where}: steady_flow is true, but {lacks}")
+            try:
+                stage = replace(stage, pore_pressure=_flow(mesh, soils, list(boundary.values()), walls, path))
+            except (mpm.InputError, RuntimeError) as error:
+                raise mpm.InputError(f"{where}: steady_flow: {error}") from None
+        result.append(stage)
+    return result
+
+
+def _asks(row: Mapping[str, Any], where: str, table: Mapping[str, Any]) -> bool:
+    given = row.get("steady_flow", False)
+    if not isinstance(given, bool):
+        raise mpm.InputError(f"{where}: steady_flow is {given!r}, expected true or false")
+    if given and "water_level" in row:
+        raise mpm.InputError(f"{where} has steady_flow and water_level, expected one of them")
+    if given and table.get("axisymmetric"):
+        raise mpm.InputError(f"{where}: steady_flow is true in an axisymmetric site, expected water_level there")
+    return given
+
+
+def _flow(
+    mesh: tuple[Any, Any, Any], soils: dict[str, water.PorousSoil], boundary: list[Any], walls: list[Any], path: Path
+) -> StageFlow:
+    """Steady flow through soils by name, by quadratic elements where no soil dries, and its pore pressures. Collective."""
+    body, cells, facets = bridge.soil_mesh(*mesh, tag=list(soils), walls=walls)
+    facets = _at_surface(body, facets)
+    acting = [one for one in boundary if _is_there(body.comm, facets, one.facet_tag)]
+    if not acting:
+        raise mpm.InputError("no boundary with a condition is at the surface of the soils that are there")
+    warn_of_reservoirs(body, acting, path)
+    dries = any(not isinstance(soil.retention, water.AlwaysSaturated) for soil in soils.values())
+    flow = water.Seepage(body, soils, facets, acting, cell_tags=cells, degree=1 if dries else 2)
+    flow.solve()
+    reservoirs = [(one, *line) for one in acting if isinstance(one, water.Reservoir)
+                  for line in water.ground_lines(body, facets, one.facet_tag)]  # fmt: skip
+    outside = water.reservoir_pressure(body, facets, acting) if reservoirs else None
+    return StageFlow(flow, flow.pore_pressure(outside=outside), reservoirs)
+
+
+def _at_surface(body: Any, facets: Any) -> Any:
+    """The tags of those facets that are at the surface of a body, with their names. Collective."""
+    there = np.isin(facets.indices, exterior_facet_indices(body.topology))
+    tags = meshtags(body, facets.dim, facets.indices[there], facets.values[there])
+    return bridge.name_tags(tags, bridge.names_of(facets))
+
+
+def _is_there(comm: MPI.Comm, facets: Any, name: str) -> bool:
+    """Whether the facets of a name, or of any other that the mesh does not know, which is named later, are there. Collective."""
+    known = bridge.names_of(facets)
+    return name not in known or comm.allreduce(int(np.isin(facets.values, known[name]).sum())) > 0

@@ -1,0 +1,112 @@
+"""Steady flow in the stages of a site: around walls, through the soils that are there, under the conditions at their surface."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from study_main import main
+
+import mpm_core as mpm
+from common.site_file import read_site
+from common.stage_flow import StageFlow
+
+MESHES = Path(__file__).parents[3] / "meshes"
+TEXT = (MESHES / "dewatered_excavation.toml").read_text().replace("cell_size = 1.0", "cell_size = 3.0")
+GAMMA = 9810.0
+
+
+def site_in(folder, text=TEXT):
+    (folder / "dewatered_excavation.geo").write_text((MESHES / "dewatered_excavation.geo").read_text())
+    (folder / "site.toml").write_text(text)
+    return folder / "site.toml"
+
+
+def pressures(site, points):
+    """Pore pressures [Pa] of each stage that has its own."""
+    return [stage.pore_pressure(np.array(points)) for stage in site.stages if stage.pore_pressure is not None]
+
+
+def test_water_flows_below_the_wall_to_the_floor_that_is_there(tmp_path):
+    site = read_site(site_in(tmp_path), MPI.COMM_WORLD)
+    flows = [stage.pore_pressure for stage in site.stages]
+    assert [type(flow) for flow in flows] == [StageFlow, type(None), StageFlow, StageFlow]
+    still, shallow, deep = (flow.flow for flow in (flows[0], flows[2], flows[3]))
+    conditions = [[one.facet_tag for one in flow.boundary] for flow in (still, shallow, deep)]
+    assert conditions == [["right"], ["right", "floor 1"], ["right", "floor 2"]]  # those at the surface of the soil
+    assert abs(still.inflow("right")) < 1e-15
+    for flow, floor in ((shallow, "floor 1"), (deep, "floor 2")):
+        assert flow.inflow("right") == pytest.approx(-flow.inflow(floor), rel=1e-8) and flow.inflow("right") > 0
+    # The head falls from 23 to 18 m; both sides of the wall are on the way, and water below the floor pushes up.
+    at_rest, _, behind = pressures(site, [(6.05, 16.0), (5.95, 16.0)])
+    assert np.allclose(at_rest, GAMMA * 7.0, rtol=1e-6)
+    assert GAMMA * 4.5 < behind[0] < GAMMA * 6.5 and GAMMA * 2.0 < behind[1] < GAMMA * 3.0
+    assert pressures(site, [(3.0, 20.0)])[2] == 0.0  # in the pit
+
+
+def test_a_flooded_pit_has_its_water_on_the_wall(tmp_path):
+    """With the water of the pit as high as the groundwater nothing flows, and the water on both sides of the wall is the same."""
+    flooded = TEXT.replace('[boundaries."floor 2"]\nseepage_face = true', '[boundaries."floor 2"]\nreservoir = 23.0')
+    site = read_site(site_in(tmp_path, flooded), MPI.COMM_WORLD)
+    points = [(5.99, 20.0), (6.01, 20.0), (3.0, 22.0), (3.0, 23.5), (40.0, 10.0)]
+    assert np.allclose(pressures(site, points)[-1], GAMMA * np.array([3.0, 3.0, 1.0, 0.0, 13.0]), atol=1.0)
+    assert abs(site.stages[-1].pore_pressure.flow.inflow("right")) < 1e-12
+
+
+def test_the_study_excavation_has_the_flow_of_each_stage(tmp_path):
+    out = tmp_path / "out"
+    assert main("excavation", ["--site", str(site_in(tmp_path)), "--output", str(out)]) == 0
+    summary = json.loads((out / "summary.json").read_text())
+    first, _, _, last = summary["stages"]
+    assert summary["finished_run"] and (out / "stages_flow.png").exists()
+    assert last["inflow_right_m2_per_day"] == pytest.approx(-last["inflow_floor 2_m2_per_day"], rel=1e-8)
+    assert first["largest_exit_gradient"] < 1e-9 and 0.2 < last["largest_exit_gradient"] < 0.6
+
+
+def test_a_floor_that_is_lifted_is_said(tmp_path):
+    """A wall that ends 1 m below the floor leaves the water a gradient of 0.75 there; that of the light soil must be below 0.63."""
+    short = TEXT.replace("[6.0, 11.0]", "[6.0, 17.0]").replace(
+        "cell_size = 3.0", "cell_size = 2.0\nconstants = {wall = 7}"
+    )
+    short = short.replace("cohesion = 1e3", "cohesion = 30e3").replace("unit_weight = 20e3", "unit_weight = 16e3")
+    with pytest.warns(
+        RuntimeWarning, match="stage 'cut to 6 m': water leaves the ground with a gradient of .*hydraulic heave"
+    ):
+        main("excavation", ["--site", str(site_in(tmp_path, short)), "--output", str(tmp_path / "out"), "--no-compare"])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("steady_flow = true", "steady_flow = 1", r"stages\[0\]: steady_flow is 1, expected true or false"),
+        ("steady_flow = true", "steady_flow = true\nwater_level = 2.0", r"stages\[0\] has steady_flow and water_level"),
+        ("head = 23.0", "head = 23.0\n[boundaries.wall]\nhead = 3.0", r"stages\[0\]: steady_flow: .*'wall'"),
+        ("conductivity = 1e-4", "", r"stages\[0\]: steady_flow is true, but no soil with a conductivity is there"),
+        (
+            "[boundaries.right]  # the groundwater far from the pit\nhead = 23.0",
+            "",
+            r"steady_flow: no boundary with a condition",
+        ),
+    ],
+)
+def test_mistakes_in_a_steady_flow_are_named(tmp_path, old, new, message):
+    assert old in TEXT
+    text = TEXT.replace("porosity = 0.4\n", "") if old.startswith("conductivity") else TEXT
+    with pytest.raises(mpm.InputError, match=message):
+        read_site(site_in(tmp_path, text.replace(old, new)), MPI.COMM_WORLD)
+
+
+def test_the_study_seepage_flows_around_walls(tmp_path):
+    """A cutoff through half of the layer takes a fifth of the flow below it."""
+    inflows = []
+    for wall in ("", '[members.wall]\nkind = "beam"\npoints = [[6.0, 24.0], [6.0, 11.0]]\naxial_stiffness = 3e9\n'
+                     'bending_stiffness = 1e8\nimpervious = true\n'):  # fmt: skip
+        text = TEXT[: TEXT.index("[members.wall]")].replace(
+            '[boundaries."floor 1"]', '[boundaries.axis]\nhead = 20.0\n[boundaries."floor 1"]'
+        )
+        text = text[: text.index('[boundaries."floor 1"]')] + wall
+        out = tmp_path / f"out {len(inflows)}"
+        assert main("seepage", ["--site", str(site_in(tmp_path, text)), "--output", str(out)]) == 0
+        inflows.append(json.loads((out / "summary.json").read_text())["steady_inflow_right_m2_per_day"])
+    assert 0 < inflows[1] < 0.85 * inflows[0]
