@@ -51,13 +51,26 @@ def real_numbers(comm: MPI.Comm, name: str, values: Any) -> NDArray[np.float64]:
     return collectively(comm, lambda: checks.real_numbers(name, values))
 
 
-def require_mesh(domain: Any) -> None:
+PARTED = "parted_along_walls"
+"""Attribute of meshes whose nodes are doubled along walls"""
+
+
+def require_mesh(domain: Any, connected: bool = False) -> None:
     """Require that an argument is a mesh, before its communicator is used. Not collective.
 
+    Args:
+        domain: the argument.
+        connected: whether its soil must hold together on both sides of walls.
+
     Raises:
-        InputError: it is something else, such as a mesh together with its tags.
+        InputError: it is something else, such as a mesh together with its tags, or a mesh that is parted along walls.
     """
     if isinstance(domain, Mesh):
+        if connected and getattr(domain, PARTED, False):
+            raise InputError(
+                "domain is parted along walls, where its soil would come apart, expected the mesh without walls: that of "
+                "soil_mesh(..., walls=...) is for water.Seepage"
+            )
         return
     whole = isinstance(domain, (tuple, list)) and len(domain) > 0 and isinstance(domain[0], Mesh)
     hint = ", the first of these: domain, cell_tags, facet_tags = ..." if whole else ""

@@ -131,7 +131,7 @@ def solve_elastic(
             alike.
         RuntimeError: the linear solver failed.
     """
-    require_mesh(domain)
+    require_mesh(domain, connected=True)
     agree(domain.comm, _first_mistake(young, poisson, unit_weight, degree))
     geometry = geometry_of(domain, geometry)
     radius = radius_of(domain, geometry)
@@ -187,7 +187,7 @@ def solve_nearly_incompressible(
         InputError: as for `solve_elastic`. Raised on all ranks alike.
         RuntimeError: the linear solver failed.
     """
-    require_mesh(domain)
+    require_mesh(domain, connected=True)
     agree(domain.comm, _first_mistake(young, poisson, unit_weight, 2))
     agree(domain.comm, None if poisson > 0 else f"poisson is {poisson!r}, expected more than 0")
     geometry = geometry_of(domain, geometry)

@@ -63,7 +63,7 @@ class MixedQuasiStatic(SupportedBody):
         solver: Solver | None = None,
         geometry: Geometry | None = None,
     ) -> None:
-        require_mesh(domain)
+        require_mesh(domain, connected=True)
         agree(domain.comm, _first_mistake(law))
         self.geometry = geometry_of(domain, geometry)
         """Plane strain, axial symmetry or a solid"""

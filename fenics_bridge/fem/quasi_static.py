@@ -84,7 +84,7 @@ class QuasiStatic(ReinforcedBody, SupportedBody, PointFunctions):
         geometry: Geometry | None = None,
         as_particles: bool = False,
     ) -> None:
-        require_mesh(domain)
+        require_mesh(domain, connected=True)
         self.geometry = geometry_of(domain, geometry)
         """Plane strain, axial symmetry or a solid"""
         self.radius = radius_of(domain, self.geometry)

@@ -70,8 +70,9 @@ def background_mesh(domain: Mesh, cell_tags: MeshTags | None = None, facet_tags:
         The mesh; its attribute `domain` is the mesh of DOLFINx.
 
     Raises:
-        InputError: tags of other entities, or of another mesh. Raised on all ranks alike.
+        InputError: a mesh that is parted along walls, or tags of other entities or of another mesh. Raised on all ranks alike.
     """
+    require_mesh(domain, connected=True)
     arrays = background_arrays(domain, cell_tags, facet_tags)
     mesh = mpm.Mesh(**arrays, cell_names=names_of(cell_tags), facet_names=names_of(facet_tags), comm=domain.comm)
     mesh.domain = domain  # type: ignore[attr-defined]  # it owns the communicator

@@ -11,7 +11,7 @@ from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.errors import agree, require_mesh
+from fenics_bridge.errors import PARTED, agree, require_mesh
 from fenics_bridge.mesh.names import name_tags, names_of, tag_numbers
 from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, owned_cells, require_tags_of, tag_values
 from fenics_bridge.mesh.walls import lines_of, parted, require_along
@@ -37,7 +37,7 @@ def soil_mesh(
         facet_tags: tags of its facets; None where none is tagged.
         tag: number or name of a soil, or a sequence of them, e.g. ["clay", "fill"].
         walls: lines (k, 2) [m], or structural members along them, at which the soil on both sides is parted: the water of a
-            `water.Seepage` does not flow through them. The mesh, of triangles, must follow them.
+            `water.Seepage`, for which alone such a mesh is, does not flow through them. The mesh, of triangles, must follow them.
 
     Returns:
         The mesh of the soil, the tags of its cells and those of its facets, which are the tags that they have in the background
@@ -66,6 +66,7 @@ def soil_mesh(
         numbers, points = _parted(domain.comm, numbers, corners, lines, points)
     arrays = MeshArrays(points, numbers, values[cells], *_facets_of(domain, cells, numbers, facet_tags))
     body, body_cells, body_facets = distributed_mesh(domain.comm, arrays, dim)
+    setattr(body, PARTED, bool(lines) or getattr(domain, PARTED, False))
     for there, here in ((cell_tags, body_cells), (facet_tags, body_facets)):
         name_tags(here, names_of(there))
     return body, body_cells, body_facets

@@ -83,7 +83,7 @@ class FarField:
         geometry: mpm.Geometry | None = None,
         options_prefix: str = "far_field_",
     ) -> None:
-        require_mesh(domain)
+        require_mesh(domain, connected=True)
         agree(domain.comm, _first_mistake(young, poisson, density, degree, supports))
         self._domain = domain
         self.geometry = geometry_of(domain, geometry)

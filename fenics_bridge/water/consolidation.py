@@ -106,7 +106,7 @@ class Consolidation(ConsolidationResults):
         inertia: Newmark | None = None,
         gravity: float = LABORATORY_GRAVITY,
     ) -> None:
-        require_mesh(domain)
+        require_mesh(domain, connected=True)
         agree(domain.comm, _first_mistake(element, nmd, soil, geometry, inertia))
         self.water = given_water(domain.comm, unit_weight, gravity, water_modulus, infinite=True)
         """Unit weight and modulus of the water, and the gravity of the model"""

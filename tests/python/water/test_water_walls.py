@@ -196,3 +196,17 @@ def test_an_impervious_wall_beside_the_mesh_is_refused_where_there_is_water():
         fem.reconfigure(members=wall, pore_pressure=stepped(1e3, 0.0))
     assert not fem.members
     fem.reconfigure(members=wall)  # without water it may be anywhere
+
+
+def test_soil_that_would_come_apart_is_refused():
+    mesh = bridge.box_mesh(COMM, (4.0, 4.0), (8, 8))
+    body, cells, facets = bridge.soil_mesh(*mesh, tag=bridge.BODY, walls=[[(2.0, 4.0), (2.0, 2.0)]])
+    part = bridge.soil_mesh(body, cells, facets, tag=bridge.BODY)[0]
+    for parted in (body, part):
+        for use in (
+            lambda domain=parted: bridge.QuasiStatic(domain, LAW, facets, []),
+            lambda domain=parted: bridge.background_mesh(domain),
+            lambda domain=parted: water.Consolidation(domain, LAW, SAND, facets, [], []),
+        ):
+            with pytest.raises(mpm.InputError, match="domain is parted along walls, where its soil would come apart"):
+                use()
