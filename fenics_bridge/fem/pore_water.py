@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree, real_numbers
-from fenics_bridge.fem.fields import assembled
+from fenics_bridge.fem.fields import assembled, cell_function
 from fenics_bridge.fem.geometry import weighted
 from fenics_bridge.fem.loads import pressing
 from fenics_bridge.fem.supports import held_components
@@ -34,6 +34,31 @@ class PrescribedWater(NamedTuple):
     """Pressure [Pa], linear in each cell; it jumps at walls that hold water back"""
     walls: MeshTags | None
     """The facets of these walls, tagged 1; None without any"""
+
+
+class WetBody:
+    """The part of `QuasiStatic` that concerns prescribed pore pressures."""
+
+    domain: Any
+    _water: PrescribedWater | None
+
+    def pore_pressure_function(self) -> fem.Function:
+        """Prescribed pore pressure [Pa] as a function that is constant in each cell; zero without water. Collective."""
+        if self._water is None:
+            return fem.Function(compat.function_space(self.domain, "DG", 0, 1), name="pore_pressure")
+        return cell_function(self.domain, ufl.as_vector([self._water.pressure]), 0, "pore_pressure")
+
+    def largest_pore_pressure(self) -> float:
+        """Largest pore pressure at a node [Pa]; 0 without water. Collective."""
+        return self._largest_at_nodes(1)
+
+    def largest_suction(self) -> float:
+        """Largest suction at a node [Pa], as far as it acts on the soil; 0 without any. Collective."""
+        return self._largest_at_nodes(-1)
+
+    def _largest_at_nodes(self, sign: int) -> float:
+        nodal = np.zeros(0) if self._water is None else sign * self._water.pressure.x.array
+        return max(self.domain.comm.allgather(float(nodal.max(initial=0.0))))
 
 
 def prescribed_water(

@@ -33,7 +33,7 @@ from fenics_bridge.fem.locking import warn_of_laws
 from fenics_bridge.fem.materials import Materials
 from fenics_bridge.fem.parameters import set_parameter
 from fenics_bridge.fem.point_functions import PointFunctions
-from fenics_bridge.fem.pore_water import PrescribedWater, water_on_supports
+from fenics_bridge.fem.pore_water import PrescribedWater, WetBody, water_on_supports
 from fenics_bridge.fem.quadrature import QuadraturePoints
 from fenics_bridge.fem.solver import Solver, given_solver
 from fenics_bridge.fem.supports import Constraints, Support
@@ -45,7 +45,7 @@ from fenics_bridge.views import body_text, law_lines
 from mpm_core import Geometry
 
 
-class QuasiStatic(ReinforcedBody, SupportedBody, PointFunctions):
+class QuasiStatic(ReinforcedBody, WetBody, SupportedBody, PointFunctions):
     """Small-strain equilibrium of a body of one or several materials, plane strain, axisymmetric or 3D, loaded in stages.
 
     Every stage starts from the equilibrium before it; a step that fails does not change that equilibrium. Collective.
@@ -362,18 +362,6 @@ class QuasiStatic(ReinforcedBody, SupportedBody, PointFunctions):
         See `SupportedBody.reaction`; the water acts in the components that are held.
         """
         return super().reaction(facet_tag) + water_on_supports(self, facet_tag)
-
-    def largest_pore_pressure(self) -> float:
-        """Largest pore pressure at a node [Pa]; 0 without water. Collective."""
-        return self._largest_at_nodes(1)
-
-    def largest_suction(self) -> float:
-        """Largest suction at a node [Pa], as far as it acts on the soil; 0 without any. Collective."""
-        return self._largest_at_nodes(-1)
-
-    def _largest_at_nodes(self, sign: int) -> float:
-        nodal = np.zeros(0) if self._water is None else sign * self._water.pressure.x.array
-        return max(self.domain.comm.allgather(float(nodal.max(initial=0.0))))
 
     def stress_function(self, smooth: bool = False) -> fem.Function:
         """The stress as a function. Collective.
