@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +41,7 @@ class StagePicture:
     displacement: Field
     there: np.ndarray
     strain: np.ndarray
-    water: np.ndarray
+    water: np.ndarray = field(default_factory=lambda: np.empty((0, 2, 2)))
     members: Sequence[np.ndarray] = ()
     flow: FlowPicture | None = None
 
@@ -67,11 +67,9 @@ def stage_picture(site: bridge.FemSite, name: str) -> StagePicture | None:
         return None
     material, strain, _ = (np.concatenate(arrays) for arrays in zip(*parts))
     box = moved.points.min(axis=0), moved.points.max(axis=0)
-    if flow is not None:
-        table = flow.table()
-    else:
-        table = level_line(pressure, *box) if pressure else np.empty((0, 2, 2))
-    return StagePicture(name, moved, material >= 0, strain, table, lines, flow)
+    water = {"water": level_line(pressure, *box)} if pressure else {}
+    water = {"water": flow.table()} if flow is not None else water
+    return StagePicture(name, moved, material >= 0, strain, members=lines, flow=flow, **water)
 
 
 def own_cell_values(fem: bridge.QuasiStatic) -> list[np.ndarray]:
