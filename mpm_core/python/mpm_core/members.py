@@ -76,10 +76,16 @@ class Member:
         """Whether its last point is its first, as in the lining of a tunnel."""
         return len(self.points) > 2 and math.dist(self.points[0], self.points[-1]) <= CLOSED * self.length
 
-    def strains(self, nodes: NDArray[np.float64]) -> MemberStrains:
-        """Its strains by the displacements of its nodes (n, D) [m]."""
+    def strains(self, nodes: NDArray[np.float64], of_revolution: bool = False) -> MemberStrains:
+        """Its strains by the displacements of its nodes (n, D) [m].
+
+        Args:
+            nodes: positions of the nodes.
+            of_revolution: whether it is a shell of revolution about x = 0, in axial symmetry.
+        """
         clamped = self.clamped_start, self.clamped_end
-        return member_strains(nodes, self.bending_stiffness > 0, self.closed, clamped)
+        strains = member_strains(nodes, self.bending_stiffness > 0, self.closed, clamped)
+        return shell_strains(strains, nodes) if of_revolution else strains
 
     def nodes(self, spacing: float) -> NDArray[np.float64]:
         """Positions (n, D) [m] that divide the line into equal segments between its corners.
@@ -271,6 +277,14 @@ class MemberStrains:
     """Number of segments, whose axial strains come first"""
     bends_at: tuple[tuple[int, ...], ...]
     """Nodes of each curvature: one, or both ends of a ring"""
+    hoops: int = 0
+    """Number of hoop strains, which come last, followed by as many hoop curvatures"""
+
+    @property
+    def is_axial(self) -> NDArray[np.bool_]:
+        """Which strains are changes of length, rather than curvatures: (k,)."""
+        place, last = np.arange(len(self.lengths)), len(self.lengths) - self.hoops
+        return (place < self.segments) | ((place >= last - self.hoops) & (place < last))
 
 
 def member_strains(
@@ -314,9 +328,38 @@ def member_strains(
     return MemberStrains(np.concatenate([axial, curvature]), np.append(lengths, halves), n - 1, tuple(bends_at))
 
 
+def shell_strains(strains: MemberStrains, nodes: NDArray[np.float64]) -> MemberStrains:
+    """The strains of a shell of revolution about x = 0, of which a chain of nodes is the meridian.
+
+    Each segment also has a hoop strain u / r and a hoop curvature theta (dr/ds) / r, with its rotation theta (Timoshenko and
+    Woinowsky-Krieger 1959, chapters 3 and 15). Lengths are times the radius: areas of one radian.
+
+    Args:
+        strains: those of the meridian.
+        nodes: positions (n, 2) [m], whose first coordinate is the radius.
+    """
+    n, edges = len(nodes), np.diff(nodes, axis=0)
+    lengths = np.linalg.norm(edges, axis=1)
+    middle, rows = nodes[:-1, 0] + edges[:, 0] / 2, np.arange(n - 1)
+    hoop, turn = np.zeros((n - 1, n, 2)), np.zeros((n - 1, n, 2))
+    hoop[rows, rows, 0] = hoop[rows, rows + 1, 0] = 0.5 / middle
+    across = np.stack([-edges[:, 1], edges[:, 0]], axis=1) / lengths[:, None] ** 2
+    leans = edges[:, 0] / lengths / middle
+    turn[rows, rows], turn[rows, rows + 1] = -leans[:, None] * across, leans[:, None] * across
+    areas = lengths * middle
+    # A curvature acts over the halves of segments beside its node.
+    halves = np.zeros(n)
+    halves[:-1] += lengths / 4 * (nodes[:-1, 0] + middle)
+    halves[1:] += lengths / 4 * (middle + nodes[1:, 0])
+    bending = [sum(halves[list(at)]) for at in strains.bends_at]
+    operator = np.concatenate([strains.operator, hoop, turn])
+    weights = np.concatenate([areas, bending, areas, areas])
+    return MemberStrains(operator, weights, strains.segments, strains.bends_at, n - 1)
+
+
 @dataclass(frozen=True)
 class MemberForces:
-    """Forces of a member, along its line. Those of plane strain are per metre."""
+    """Forces of a member, along its line. Those of plane strain are per metre, those of axial symmetry per metre of their section."""
 
     positions: NDArray[np.float64]
     """Its nodes as they were installed [m], shape (n, D)"""
@@ -326,6 +369,10 @@ class MemberForces:
     """Axial force of each segment [N/m], tension positive, shape (n - 1,)"""
     moment: NDArray[np.float64]
     """Bending moment at the nodes [N m/m], 0 at free ends, shape (n,); positive where its left side, seen along its line, is compressed"""
+    hoop_force: NDArray[np.float64] | None = None
+    """In axial symmetry, hoop force of each segment [N/m], tension positive, shape (n - 1,)"""
+    hoop_moment: NDArray[np.float64] | None = None
+    """In axial symmetry, hoop moment of each segment [N m/m], with the sign of the moment, shape (n - 1,)"""
 
     @property
     def places(self) -> NDArray[np.float64]:
@@ -345,7 +392,8 @@ class MemberForces:
     def __repr__(self) -> str:
         axial = f"axial force from {self.axial_force.min():.4g} to {self.axial_force.max():.4g} N/m"
         moment = f", moment from {self.moment.min():.4g} to {self.moment.max():.4g} N m/m" if self.bends else ""
-        return f"<MemberForces: {len(self.positions)} nodes, {axial}{moment}>"
+        hoop = "" if self.hoop_force is None else f", hoop force from {self.hoop_force.min():.4g} to {self.hoop_force.max():.4g} N/m"
+        return f"<MemberForces: {len(self.positions)} nodes, {axial}{moment}{hoop}>"
 
 
 def of_members(members: Any) -> dict[str, Member]:
