@@ -73,7 +73,8 @@ class AveragedKinematics:
         dofs, nodes, gradients, volumes, radii = self._cells(displacements, dofs, geometry == Geometry.AXISYMMETRIC)
         n_own = self._n_dofs, displacements.dofmap.index_map.size_local
         self._cells_of_strain = n_own, dofs, nodes, gradients, volumes, radii
-        self._is_assembled = assembled
+        self.factored = not assembled
+        """Whether `stiffness` stays in factors, to which nothing can be added"""
         self._groups: list[int] = []
         self._without = None if assembled else Kinematics(increment, points, constraints, geometry)
         self._more: tuple[Any, Stiffness] | None = None
@@ -113,7 +114,7 @@ class AveragedKinematics:
         comm, present = self._space.mesh.comm, self._points.material >= 0
         of_cells = np.array(groups)[number]
         self._strain = AveragedStrain(comm, *self._cells_of_strain, present, of_cells, max(groups) + 1)
-        self._assembled = AssembledStiffness(self._strain) if self._is_assembled else None
+        self._assembled = AssembledStiffness(self._strain) if not self.factored else None
 
     def strain_increment(self) -> NDArray[np.float64]:
         """Averaged strain of the increment in each cell: (n, S)."""

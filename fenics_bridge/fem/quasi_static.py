@@ -40,6 +40,7 @@ from fenics_bridge.fem.supports import Constraints, Support
 from fenics_bridge.mesh.names import known_tags
 from fenics_bridge.structures.installed import Members
 from fenics_bridge.structures.reinforced import ReinforcedBody
+from fenics_bridge.structures.unknowns import unknowns_of
 from fenics_bridge.types import Law, Laws, MeshTags, OfPosition
 from fenics_bridge.views import body_text, law_lines
 from mpm_core import Geometry
@@ -123,8 +124,7 @@ class QuasiStatic(ReinforcedBody, WetBody, SupportedBody, PointFunctions):
         """The boundary conditions in force"""
         self._loads = LoadVectors(space, facet_tags, cell_tags, radius=self.radius)
         self._water: PrescribedWater | None = None
-        self._members = Members(space)
-        self._n_own = space.dofmap.index_map.size_local * space.dofmap.index_map_bs
+        self._members = Members(unknowns_of(space))
         self._materials = Materials(domain, law, cell_tags)
         quadrature = max(1, 2 * (degree - 1))
         axisymmetric = self.radius is not None

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.evaluate import local_cells
-from fenics_bridge.mesh.background import global_numbers
 from fenics_bridge.mesh.tagged import owned_cells
+from fenics_bridge.structures.unknowns import Unknowns
 
 TOLERANCE = 0.02
 """How far outside of the soil a point may be, in barycentric coordinates of the nearest cell: the corners of a line that the mesh
@@ -25,7 +25,7 @@ class Embedding:
     """The cells around some points, and the shape functions of their nodes there; the same on all ranks. Collective.
 
     Args:
-        space: Lagrange space of displacements.
+        unknowns: displacements of the body's nodes.
         points: positions (n, D) [m], the same on all ranks.
         active: function that is 1 in cells that are there and 0 in others; None where all are.
         owners: what each point belongs to, for the message.
@@ -34,15 +34,13 @@ class Embedding:
         InputError: a point is in no active cell. Raised on all ranks alike.
     """
 
-    def __init__(self, space: Any, points: NDArray[np.float64], active: Any, owners: Sequence[str]) -> None:
-        domain = space.mesh
+    def __init__(self, unknowns: Unknowns, points: NDArray[np.float64], active: Any, owners: Sequence[str]) -> None:
+        space, domain = unknowns.space, unknowns.space.mesh
         cells = _active_cells(domain, points, active)
         mine = _mine(domain, cells, points)
         weights = shape_functions(space, cells[mine], points[mine])
-        index_map = space.dofmap.index_map
-        numbers = global_numbers(index_map, index_map.size_local + index_map.num_ghosts)
-        nodes = numbers[compat.cell_dofs(space)[cells[mine]]]
-        found = domain.comm.allgather((mine, nodes, weights))
+        dofs = unknowns.numbers[compat.cell_dofs(space)[cells[mine]]]
+        found = domain.comm.allgather((mine, dofs, weights))
         order = np.concatenate([rows for rows, _, _ in found])
         lost = np.setdiff1d(np.arange(len(points)), order)
         if len(lost):
@@ -52,10 +50,10 @@ class Embedding:
                 f"{owners[lost[0]]}: the point ({where}) m is in no soil that is there, expected points in the soil",
             )
         back = np.argsort(order)
-        self.nodes = np.concatenate([each for _, each, _ in found])[back]
-        """Global numbers of the nodes of each point's cell, (n, k)"""
+        self.dofs = np.concatenate([each for _, each, _ in found])[back]
+        """Global numbers of the unknowns of each point's cell, by node and component, (n, k, D)"""
         self.weights = np.concatenate([each for _, _, each in found])[back]
-        """Their shape functions at the point, (n, k)"""
+        """Shape functions of these nodes at the point, (n, k)"""
 
 
 def cell_sizes_along(domain: Any, lines: Sequence[NDArray[np.float64]]) -> list[float]:

@@ -15,6 +15,7 @@ from scipy import sparse
 from fenics_bridge import compat
 from fenics_bridge.structures.bond import bond_strengths, slip_tangent
 from fenics_bridge.structures.embedding import Embedding, cell_sizes_along
+from fenics_bridge.structures.unknowns import Unknowns
 from mpm_core import _core
 
 
@@ -36,9 +37,9 @@ class _Installed:
     stressing: bool
     """Whether it is being stressed: its axial forces stay what they are"""
     movement: Any = None
-    """Matrix of the displacements of the nodes by those of the body's nodes (n D, dofs)"""
+    """Matrix of the displacements of the nodes by the unknowns of the body (n D, unknowns)"""
     strain: Any = None
-    """Matrix of the strains by the displacements of the body's nodes (k, dofs)"""
+    """Matrix of the strains by the unknowns of the body (k, unknowns)"""
 
     def stiffness(self) -> NDArray[np.float64]:
         """Elastic stiffness of each strain: (k,)."""
@@ -81,17 +82,18 @@ class Members:
 
     Displacements of the members' nodes are those of the soil there, so that a strain is linear in the displacements u of the body's
     nodes, e = G u, and the forces on these are G^T (L s), with the axial forces and moments s over their lengths L. The rows of G
-    are the same on all ranks, which each multiply their own columns.
+    are the same on all ranks, which each multiply their own columns. Columns of unknowns other than displacements, as of pore
+    pressures, are empty.
 
     Args:
-        space: Lagrange space of displacements.
+        unknowns: the unknowns of the body.
     """
 
-    def __init__(self, space: Any) -> None:
-        self._space, self._comm = space, space.mesh.comm
-        index_map, block = space.dofmap.index_map, space.dofmap.index_map_bs
-        self._n_own, self._n = index_map.size_local * block, index_map.size_global * block
-        self._first = index_map.local_range[0] * block
+    def __init__(self, unknowns: Unknowns) -> None:
+        self._unknowns, self._space, self._comm = unknowns, unknowns.space, unknowns.space.mesh.comm
+        self._first, self._n = unknowns.first, unknowns.size
+        self.n_own = unknowns.own
+        """Number of this rank's own unknowns"""
         self._there: dict[str, _Installed] = {}
         self._trial: NDArray[np.float64] = np.zeros(0)
         self._tangent: Any = None  # derivatives of the forces by the strains
@@ -139,7 +141,7 @@ class Members:
 
         Args:
             prepared: the members.
-            displacement: displacements of this rank's own dofs now [m].
+            displacement: this rank's own unknowns now.
         """
         self._there = prepared
         for one in prepared.values():
@@ -165,7 +167,7 @@ class Members:
         """Forces and stiffness after an increment, for `forces` and `with_stiffness`. Collective.
 
         Args:
-            increment: displacements of this rank's own dofs since the last step that was accepted [m].
+            increment: change of this rank's own unknowns since the last step that was accepted.
             as_elastic: as the elastic stiffness predicts them, also where they exceed the strength: for the first residual of a step.
         """
         strain = self._strain(increment)
@@ -193,7 +195,7 @@ class Members:
         self.back()
 
     def forces(self) -> Any:
-        """Internal nodal forces on this rank's own dofs [N]."""
+        """Internal nodal forces on this rank's own unknowns [N]."""
         return self._own_strains.T @ (self._lengths * self._trial)
 
     def with_stiffness(self, matrix: PETSc.Mat, held: NDArray[np.integer]) -> PETSc.Mat:
@@ -215,13 +217,13 @@ class Members:
 
     def of_all_ranks(self, dofs: NDArray[np.integer]) -> NDArray[np.float64]:
         """For each dof of all ranks, 1 where it is among some of this rank's own ones on any of them, otherwise 0. Collective."""
-        mine = np.zeros(self._n_own)
+        mine = np.zeros(self.n_own)
         mine[dofs] = 1.0
         return np.concatenate(self._comm.allgather(mine))
 
     def _matrix(self, rows: Any) -> PETSc.Mat:
         """A matrix of PETSc from this rank's own rows. Collective."""
-        own, size = rows.tocsr(), (self._n_own, self._n)
+        own, size = rows.tocsr(), (self.n_own, self._n)
         own.sort_indices()
         parts = own.indptr.astype(np.int32), own.indices.astype(np.int32), own.data
         return PETSc.Mat().createAIJ((size, size), csr=parts, comm=self._comm)
@@ -231,7 +233,7 @@ class Members:
 
         Args:
             name: name of the member.
-            displacement: displacements of this rank's own dofs [m].
+            displacement: this rank's own unknowns.
         """
         one = self._there[name]
         moment = np.zeros(len(one.nodes))
@@ -245,7 +247,7 @@ class Members:
 
         Args:
             name: name of the member.
-            displacement: displacements of this rank's own dofs [m].
+            displacement: this rank's own unknowns.
         """
         return self._moved(self._there[name], displacement)
 
@@ -270,21 +272,19 @@ class Members:
             return
         names = [where + _named(name, one.member) for name, one in there.items()]
         owners = [name for name, nodes in zip(names, moving) for _ in nodes]
-        embedding = Embedding(self._space, np.concatenate(moving), active, owners)
+        embedding = Embedding(self._unknowns, np.concatenate(moving), active, owners)
         start = 0
         for one, nodes in zip(there.values(), moving):
             rows = slice(start, start + len(nodes))
-            self._move_by(one, embedding.nodes[rows], embedding.weights[rows])
+            self._move_by(one, embedding.dofs[rows], embedding.weights[rows])
             start += len(nodes)
 
-    def _move_by(self, one: _Installed, nodes: NDArray[np.integer], weights: NDArray[np.float64]) -> None:
-        """Let the first nodes of a member move by the body's nodes (n, k), with these shape functions (n, k)."""
+    def _move_by(self, one: _Installed, dofs: NDArray[np.integer], weights: NDArray[np.float64]) -> None:
+        """Let the first nodes of a member move by unknowns of the body (n, k, D), with these shape functions (n, k)."""
         count, dim = one.nodes.shape
-        components = np.arange(dim)
-        columns = (dim * nodes[:, None, :] + components[:, None]).ravel()
-        rows = np.broadcast_to(
-            (dim * np.arange(len(nodes))[:, None] + components)[:, :, None], (len(nodes), dim, nodes.shape[1])
-        )
+        columns = np.swapaxes(dofs, 1, 2).ravel()
+        rows = np.arange(dim * len(dofs)).reshape(-1, dim, 1)
+        rows = np.broadcast_to(rows, (len(dofs), dim, dofs.shape[1]))
         values = np.broadcast_to(weights[:, None, :], rows.shape)
         one.movement = sparse.csr_matrix((values.ravel(), (rows.ravel(), columns)), (count * dim, self._n))
         operator = one.member.strains(one.nodes).operator
@@ -292,7 +292,7 @@ class Members:
 
     def _own(self, matrix: Any) -> Any:
         """The columns of this rank's own dofs."""
-        return matrix[:, self._first : self._first + self._n_own]
+        return matrix[:, self._first : self._first + self.n_own]
 
     def _strain(self, displacement: NDArray[np.float64]) -> Any:
         return self._comm.allreduce(self._own_strains @ displacement)
@@ -300,6 +300,22 @@ class Members:
     def _moved(self, one: _Installed, displacement: NDArray[np.float64]) -> Any:
         """Displacements of the nodes of a member (n, D) [m]. Collective."""
         return self._comm.allreduce(self._own(one.movement) @ displacement).reshape(one.nodes.shape)
+
+    def taken_over(self, other: Members, active: Any) -> dict[str, _Installed]:
+        """The members of another body on the same mesh, with the forces they carry, for `change`. Collective.
+
+        Displacements count from now on, those of the body being zero.
+
+        Args:
+            other: members of the other body.
+            active: as for `prepared`.
+
+        Raises:
+            InputError: a node of a member is in no soil that is there. Raised on all ranks alike.
+        """
+        there = {name: replace(one, force=one.force.copy(), origin=None) for name, one in other.installed()}
+        self._embed(there, active, "stress: ")
+        return there
 
     def reset(self) -> None:
         """Start with the prestress alone, the displacements of the body being zero."""

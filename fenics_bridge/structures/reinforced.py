@@ -13,15 +13,12 @@ from fenics_bridge.structures.member_warnings import warn_of_members
 
 
 class ReinforcedBody:
-    """The part of `QuasiStatic` that concerns structural members."""
+    """The part of `QuasiStatic` and `water.Consolidation` that concerns structural members."""
 
     domain: Any
-    displacement: Any
     radius: Any
     _body: Any
     _members: Members
-    _n_own: int
-    _nmd: bool
     _options_prefix: str
 
     @property
@@ -40,7 +37,7 @@ class ReinforcedBody:
         """
         known = name in self._members.given
         agree(self.domain.comm, None if known else f"name is {name!r}, expected one of {list(self._members)}")
-        return self._members.result(name, self.displacement.x.array[: self._n_own])
+        return self._members.result(name, self._own_unknowns())
 
     def require_members(self, members: dict[str, Member], active: Any, where: str = "") -> None:
         """Require that members suit the body and are in soil that is there. Collective.
@@ -62,7 +59,7 @@ class ReinforcedBody:
         wrong = None if other is None else f"{other!r} has {members[other].dim} dimensions, expected {dim}"
         if members and self.radius is not None:
             wrong = "there are some in an axisymmetric body, expected plane strain or three dimensions"
-        if members and self._nmd and not self._body.solver.direct:
+        if members and getattr(self._body.kinematics, "factored", False):
             wrong = (
                 f"there are some with nmd=True in more than {AVERAGED_LIMIT} nodes of three dimensions, expected degree=2, or the "
                 f"option -{self._options_prefix}pc_type lu"
@@ -73,6 +70,14 @@ class ReinforcedBody:
     def _change_members(self, prepared: Any) -> None:
         """Install, keep and remove members that were prepared. Collective."""
         before = set(self._members)
-        self._members.change(prepared, self.displacement.x.array[: self._n_own])
+        self._members.change(prepared, self._own_unknowns())
         held = self._body.constraints.dofs
-        warn_of_members(self._members, held[held < self._n_own], before, self.domain.comm)
+        warn_of_members(self._members, held[held < self._members.n_own], before, self.domain.comm)
+
+    def _moved_member(self, name: str) -> Any:
+        """Displacements of a member's nodes, those of the soil before its installation among them (n, D) [m]. Collective."""
+        return self._members.moved(name, self._own_unknowns())
+
+    def _own_unknowns(self) -> Any:
+        """This rank's own unknowns at the last step accepted."""
+        return self._body.solution.x.array[: self._members.n_own]
