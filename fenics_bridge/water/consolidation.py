@@ -9,6 +9,8 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
+from mpm_core.collective import collectively
+from mpm_core.members import Member, of_members
 from mpm_core.water_checks import LABORATORY_GRAVITY
 from numpy.typing import ArrayLike, NDArray
 
@@ -27,6 +29,8 @@ from fenics_bridge.fem.quadrature import QuadraturePoints
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.fem.solver import Solver, given_solver
 from fenics_bridge.fem.supports import Constraints, Support
+from fenics_bridge.structures.installed import Members
+from fenics_bridge.structures.unknowns import unknowns_of
 from fenics_bridge.types import Laws, MeshTags, OfPosition
 from fenics_bridge.views import body_text
 from fenics_bridge.water.applied import AppliedBoundary
@@ -49,6 +53,9 @@ from fenics_bridge.water.seepage import Seepage
 from fenics_bridge.water.soils import WATER_MODULUS, PorousSoil, given_water, soils_by_tag
 from fenics_bridge.water.time_steps import run
 from mpm_core import Geometry
+
+RELEASED = 1e-9
+"""Part of forces that are held, up to which they count as released"""
 
 
 class Consolidation(ConsolidationResults):
@@ -167,7 +174,8 @@ class Consolidation(ConsolidationResults):
         """Put together what does not depend on the water's boundary conditions, then what does. Collective."""
         solution, increment = fem.Function(self._space), fem.Function(self._space)
         linear = LinearSolver(self._space, options_prefix, newton=True)
-        self._body = Body(solution, increment, self.points, None, None, linear)
+        self._members = Members(unknowns_of(self._space, *self._displacements))
+        self._body = Body(solution, increment, self.points, None, None, linear, self._members)
         maps = [(part.dofmap, dofs) for part, dofs in (self._displacements, self._pressures)]
         self._owned = [dofs[: m.index_map.size_local * m.index_map_bs] for m, dofs in maps]
         # Stabilised elements take one point for all: FFCx 0.5 mixes up the radii of integrals of degree 1 and others.
@@ -243,11 +251,13 @@ class Consolidation(ConsolidationResults):
 
         Args:
             stress: effective stress [Pa] at `points.coordinates()`, shape (n, S), or a QuasiStatic on the same mesh with elements
-                of the same degree and the same laws, of which the state is taken too; None for none.
+                of the same degree and the same laws, of which the state and the structural members with their forces are taken too;
+                None for none. Without a QuasiStatic members have their prestress alone.
             pore_pressure: function of positions (n, D) [m] that returns pressures (n,) [Pa], or a Seepage; None for none.
 
         Raises:
-            InputError: values of another shape or not finite, or finite elements that did not converge. Raised on all ranks alike.
+            InputError: values of another shape or not finite, finite elements that did not converge, or that are without a
+                member which is here. Raised on all ranks alike.
         """
         set_initial_state(self, stress, pore_pressure)
 
@@ -259,12 +269,14 @@ class Consolidation(ConsolidationResults):
         stress: OfPosition | None = None,
         law: Laws | None = None,
         duration: float = 0.0,
+        members: dict[str, Member] | None = None,
     ) -> None:
-        """Place and remove soil, or change laws and supports, between steps. Collective.
+        """Place and remove soil or structural members, or change laws and supports, between steps. Collective.
 
         The steps that follow release what is then out of balance, such as the weight of soil that is placed, while the water
         flows: in equal parts per time over `duration`, or in the next step. `load` and `boundary` hold for the soil that is
         there: give the latter its new surfaces. Water that rises or falls beside the soil that comes or goes does so at once.
+        With inertia only members may change.
 
         Args:
             off: cell tags or names of the soils that are not there; all others are.
@@ -275,11 +287,14 @@ class Consolidation(ConsolidationResults):
                 for none.
             law: law, or laws by cell tag, from now on; where the law changes, its state is reset.
             duration: time over which what is out of balance is released [s].
+            members: the structural members that are there from now on by name, as for `QuasiStatic.reconfigure`; {} for none, None
+                for the present ones. A prestress is constant until what is out of balance has been released.
 
         Raises:
-            InputError: an unknown tag, or a value out of range. Raised on all ranks alike.
+            InputError: an unknown tag, a value out of range, or a member outside of the soil. Raised on all ranks alike.
         """
-        reconfigure(self, off, supports, pore_pressure, stress, law, duration)
+        given = collectively(self.domain.comm, lambda: None if members is None else of_members(members))
+        reconfigure(self, off, supports, pore_pressure, stress, law, duration, given)
 
     # --- steps -------------------------------------------------------------------------------------------------------
 
@@ -318,6 +333,8 @@ class Consolidation(ConsolidationResults):
             self.motion.accept(self._body.increment.x.array[self._displacements[1]], dt)
         self._body.accept()
         self.points.time = self.time = end
+        if self._held_part(end) == 0:
+            self._members.lock_off()
         self._external, self._active = external, active
         self._standing = self._reservoirs.forces(end)
         self._read_pressure()
@@ -358,9 +375,14 @@ class Consolidation(ConsolidationResults):
 
     def _external_at(self, time: float) -> Any:
         """Nodal forces at a time [s]: of loads, standing water, and what `reconfigure` holds. Collective."""
+        held = self._held_part(time) * self._held
+        return self._loads.forces(self.load_at(time)) + self._reservoirs.forces(time) + held
+
+    def _held_part(self, time: float) -> float:
+        """Part of what `reconfigure` holds that has not been released at a time [s]; 0 but for round-off counts as 0."""
         start, duration = self._holding
-        held = max(0.0, 1 - (time - start) / duration) if duration > 0 else 0.0
-        return self._loads.forces(self.load_at(time)) + self._reservoirs.forces(time) + held * self._held
+        part = 1 - (time - start) / duration if duration > 0 else 0.0
+        return part if part > RELEASED else 0.0
 
     def _moved(self) -> NDArray[np.float64]:
         """Displacements at the end of the step under trial [m], shape (m,)."""

@@ -16,6 +16,7 @@ from fenics_bridge.fem.fields import SupportedBody, nodal_average, part_of
 from fenics_bridge.fem.loads import LoadVectors
 from fenics_bridge.fem.point_functions import PointFunctions
 from fenics_bridge.fem.supports import Constraints, Support
+from fenics_bridge.structures.reinforced import ReinforcedBody
 from fenics_bridge.types import MeshTags, OfPosition
 from fenics_bridge.water.applied import AppliedBoundary
 from fenics_bridge.water.coupled import WaterTerms
@@ -24,7 +25,7 @@ from fenics_bridge.water.positions import at_positions
 from fenics_bridge.water.soils import acting_pressure
 
 
-class ConsolidationResults(SupportedBody, PointFunctions):
+class ConsolidationResults(SupportedBody, PointFunctions, ReinforcedBody):
     """The results of `Consolidation`, whose constructor sets these attributes."""
 
     domain: Mesh
@@ -120,6 +121,7 @@ class ConsolidationResults(SupportedBody, PointFunctions):
         self._body.increment.x.array[:] = 0.0
         if self.motion is not None:
             self.motion.rest_on()
-        forces = self._external - self._body.kinematics.internal_forces(self.points.stress).array
+        self._members.back()
+        forces = self._external - self._body.internal_forces(self.points.stress).array
         space, dofs = self._displacements
         return space, forces[dofs], self._facet_tags, self._supports.supports

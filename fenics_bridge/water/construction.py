@@ -1,4 +1,4 @@
-"""Soil that is placed and removed while the ground consolidates."""
+"""Soil and structural members that are placed and removed while the ground consolidates."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import ufl
 from dolfinx import fem
+from mpm_core.members import Member
 from numpy.typing import NDArray
 
 from fenics_bridge import compat
@@ -20,11 +21,18 @@ from fenics_bridge.mesh.tagged import owned_cells
 
 
 def reconfigure(
-    model: Any, off: Sequence[int | str], supports: Any, pore_pressure: Any, stress: Any, law: Any, duration: float
+    model: Any,
+    off: Sequence[int | str],
+    supports: Any,
+    pore_pressure: Any,
+    stress: Any,
+    law: Any,
+    duration: float,
+    members: dict[str, Member] | None,
 ) -> None:
     """Apply the changes of `Consolidation.reconfigure`."""
     domain, points, before = model.domain, model.points, model._laws
-    _check(model, off, duration)
+    _check(model, off, duration, members_alone=all(each is None for each in (supports, pore_pressure, stress, law)))
     off = tag_numbers(domain.comm, model.cell_tags, off, "off", "cell") if len(off) else ()
     laws = before if law is None else model._materials.laws(law)
     constraints = model._supports if supports is None else Constraints(model._space.sub(0), model._facet_tags, supports)
@@ -32,6 +40,7 @@ def reconfigure(
     was_there = model._there.x.array > 0
     new = np.repeat((there.x.array > 0)[points.cells] & ~was_there[points.cells], points.per_cell)
     pressures, given = _pressures(model, pore_pressure), given_stress(model, stress, new)
+    prepared = model._prepared_members(model.members if members is None else members, there if len(off) else None)
     points.assign(np.where(there.x.array[: owned_cells(domain)] > 0, model._materials.number, -1), len(laws))
     take_over(model, new, laws, before, given)
     model._laws, model.off = laws, off
@@ -42,6 +51,7 @@ def reconfigure(
     had_none = model._waterless
     model._configure()
     _fill_pores(model, had_none, pressures)
+    model._change_members(prepared)
     _hold(model, duration, _risen(model, was_there))
 
 
@@ -60,9 +70,9 @@ def lonely_dofs(model: Any) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     )
 
 
-def _check(model: Any, off: Any, duration: float) -> None:
-    comm = model.domain.comm
-    agree(comm, "the model has inertia, expected quasi-static steps" if model.motion is not None else None)
+def _check(model: Any, off: Any, duration: float, members_alone: bool) -> None:
+    comm, refused = model.domain.comm, model.motion is not None and (len(off) or not members_alone)
+    agree(comm, "the model has inertia, expected quasi-static steps, or members alone that change" if refused else None)
     good = is_finite(duration) and duration >= 0
     agree(comm, None if good else f"duration is {duration!r} s, expected a number from 0 on")
     missing = len(off) and model.cell_tags is None
@@ -127,9 +137,11 @@ def _hold(model: Any, duration: float, risen: NDArray[np.float64]) -> None:
     """Hold what is out of balance now, but for the forces of water that has risen; the steps that follow release it."""
     body, dofs = model._body, model._displacements[1]
     body.increment.x.array[:] = 0.0
+    if model.motion is not None:
+        model.motion.rest_on()
     model._held, model._holding = 0.0, (model.time, duration)
     external = model._external_at(model.time)
-    internal = body.kinematics.internal_forces(model.points.stress).array
+    internal = body.internal_forces(model.points.stress).array
     held = np.zeros_like(internal)
     held[dofs] = internal[dofs] - external[dofs]
     model._held, model._external = held + risen, external + held

@@ -17,11 +17,12 @@ from fenics_bridge.water.seepage import Seepage
 def set_initial_state(model: Any, stress: Any, pore_pressure: Any) -> None:
     """Do what `Consolidation.initialise` says."""
     comm, points, solution = model.domain.comm, model.points, model._body.solution
-    state = None
+    state, members = None, None
     if isinstance(stress, QuasiStatic):
         agree(
             comm, None if stress.converged else "stress is a QuasiStatic that has not been solved, or did not converge"
         )
+        members = _members_of(model, stress)
         stress, state = stress.points.stress, stress.points.state
     pressure = _pressures(model, pore_pressure)
     _require(comm, "stress", stress, points.stress.shape)
@@ -36,8 +37,20 @@ def set_initial_state(model: Any, stress: Any, pore_pressure: Any) -> None:
     if pressure is not None:
         solution.x.array[model._pressures[1]] = pressure / model._unit
         solution.x.array[model._pressures[1][model._waterless]] = 0.0
-    model._held, model._standing = 0.0, None
+    model._held, model._holding, model._standing = 0.0, (model.time, 0.0), None
+    if members is None:
+        model._members.reset()
+    else:
+        model._members.change(members, model._own_unknowns())
     model._read_pressure()
+
+
+def _members_of(model: Any, fem: QuasiStatic) -> Any:
+    """The structural members of finite elements with their forces, for `Members.change`. Collective."""
+    absent = [name for name, member in model.members.items() if fem.members.get(name) != member]
+    missing = f"stress is a QuasiStatic without the member {absent[0]!r} of this model, expected it there" if absent else None
+    agree(model.domain.comm, missing)
+    return model._members.taken_over(fem._members, model._there if len(model.off) else None)
 
 
 def _pressures(model: Any, pore_pressure: Any) -> Any:
