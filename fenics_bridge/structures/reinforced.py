@@ -74,7 +74,7 @@ class ReinforcedBody:
         held = self._body.constraints.dofs
         warn_of_members(self._members, held[held < self._members.n_own], before, self.domain.comm)
 
-    def _moved_member(self, name: str) -> Any:
+    def moved_member(self, name: str) -> Any:
         """Displacements of a member's nodes, those of the soil before its installation among them (n, D) [m]. Collective."""
         return self._members.moved(name, self._own_unknowns())
 

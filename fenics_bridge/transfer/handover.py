@@ -286,7 +286,7 @@ def _take_members(model: mpm.Model, fem: Any, move: bool) -> None:
     members, forces = getattr(fem, "members", {}), {}
     for name in members:
         given = fem.member_forces(name)
-        moved = fem._moved_member(name)
+        moved = fem.moved_member(name)
         forces[name] = replace(given, displacement=moved if move else np.zeros_like(moved))
     model.install(members, forces)
 

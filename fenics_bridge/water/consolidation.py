@@ -162,7 +162,8 @@ class Consolidation(ConsolidationResults):
         self.motion: Motion | None = None
         """Velocity and acceleration; None in quasi-static steps"""
         self._named_coarse_cells = False  # whether `run` has warned of cells that are too large for its first step
-        self._assemble(options_prefix, inertia)
+        self._options_prefix = options_prefix
+        self._assemble(inertia)
         self._external = self._loads.forces(Load())
         warn_of_laws(self, "Element.TAYLOR_HOOD hardly locks")
 
@@ -170,12 +171,11 @@ class Consolidation(ConsolidationResults):
         laws = map(repr, self._laws)
         return body_text("Consolidation", self.domain, f"t = {self.time:g} s", geometry=self.geometry, lines=laws)
 
-    def _assemble(self, options_prefix: str, inertia: Newmark | None) -> None:
+    def _assemble(self, inertia: Newmark | None) -> None:
         """Put together what does not depend on the water's boundary conditions, then what does. Collective."""
         solution, increment = fem.Function(self._space), fem.Function(self._space)
-        linear = LinearSolver(self._space, options_prefix, newton=True)
         self._members = Members(unknowns_of(self._space, *self._displacements))
-        self._body = Body(solution, increment, self.points, None, None, linear, self._members)
+        self._body = Body(solution, increment, self.points, None, None, None, self._members)
         maps = [(part.dofmap, dofs) for part, dofs in (self._displacements, self._pressures)]
         self._owned = [dofs[: m.index_map.size_local * m.index_map_bs] for m, dofs in maps]
         # Stabilised elements take one point for all: FFCx 0.5 mixes up the radii of integrals of degree 1 and others.
@@ -198,6 +198,7 @@ class Consolidation(ConsolidationResults):
 
     def _configure(self) -> None:
         """Put together what depends on the cells that are there, on the laws and on the supports. Collective."""
+        self._renew_solver()
         domain, space, whole = self.domain, self._space, not len(self.off)
         lonely, self._waterless = lonely_dofs(self)
         self._body.constraints = CoupledConstraints(
@@ -218,6 +219,10 @@ class Consolidation(ConsolidationResults):
         )
         self._gravity = self._terms.gravity_flow(space)
         self._take_boundary(first=True)
+
+    def _renew_solver(self) -> None:
+        """Solve systems anew whose matrices may have entries at other places, as by members that come or go. Collective."""
+        self._body.solver = LinearSolver(self._space, self._options_prefix, newton=True)
 
     def _take_boundary(self, first: bool = False) -> None:
         """Put together what depends on the water's boundary conditions, where they have changed. Collective."""

@@ -42,6 +42,7 @@ def set_initial_state(model: Any, stress: Any, pore_pressure: Any) -> None:
         model._members.reset()
     else:
         model._members.change(members, model._own_unknowns())
+        model._renew_solver()
     model._read_pressure()
 
 
