@@ -3,7 +3,7 @@
 The site is a TOML file (`meshes/fill.toml` unless another is given): a mesh of gmsh, soils with laws of effective stress and
 conductivities, supports, boundary conditions of the pore water, and loads over time. The ground is first in equilibrium under its
 weight and steady flow; from there displacements and pore pressures are computed together, while loads rise, pause and fall, and
-soil is placed and dug away in stages. With `--particles`, implicit particles with pore water start from the same equilibrium and
+soil and structural members come and go in stages. With `--particles`, implicit particles with pore water start from the same equilibrium and
 are computed beside the finite elements, with the same steps and small displacements.
 """
 
@@ -17,6 +17,7 @@ from time import perf_counter
 
 import numpy as np
 from common.checks import say
+from common.consolidation_members import MembersOverTime
 from common.consolidation_particles import ParticleGround, near_line
 from common.consolidation_plots import (
     EXCESS,
@@ -31,6 +32,7 @@ from common.consolidation_stages import pressures_of
 from common.field_files import FieldFiles
 from common.field_plots import Field, gathered
 from common.figures import Pictures
+from common.member_results import captions
 from common.movie import PORE, particle_movie
 from common.options import add_count, add_flag, add_number, add_switch, study_parser
 from common.page import Page
@@ -108,6 +110,7 @@ class Files(FieldFiles):
         filmed: bool,
     ) -> None:
         self._model, self._names, self.particles = model, list(site.points), particles
+        self.members = MembersOverTime(site.site.members)
         self._places = np.array(list(site.points.values())) if comm.rank == 0 else np.empty((0, 2))
         self._start = model.pressure.x.array.copy()
         self._excess = fem.Function(model.pressure.function_space, name="excess_pore_pressure")
@@ -118,6 +121,7 @@ class Files(FieldFiles):
             "largest_excess_pressure_Pa",
             "least_excess_pressure_Pa",
             "water_error_m2",
+            *self.members.columns,
         ]
         if particles is not None:
             columns += [f"settlement_{name}_particles_m" for name in self._names]
@@ -143,7 +147,7 @@ class Files(FieldFiles):
             values |= {f"settlement_{name}_particles_m": value for name, value in theirs}
             values["largest_excess_pressure_particles_Pa"] = self.particles.largest_excess()
         error = report.water_error if report else 0.0
-        self.history.add(time_days=model.time / DAY, water_error_m2=error, **values)
+        self.history.add(time_days=model.time / DAY, water_error_m2=error, **values, **self.members.row(model))
         if self._filmed:
             self.film.append(self._picture())
 
@@ -162,13 +166,14 @@ class Files(FieldFiles):
         self.output.write(model.time, fields, {})
         if self.particles is not None:
             self.particles.frame(model.time / DAY)
+        self.members.frame(model)
         self.pictures.append(self._picture())
 
     def _picture(self) -> ExcessPicture | None:
         """Excess pressures and displacements now; None but on the first rank. Collective."""
         excess, moved = self._that_is_there(gathered(self._excess)), gathered(self._model.displacement)
-        name = f"After {time_in_words(self._model.time)}"
-        return None if excess is None or moved is None else ExcessPicture(name, excess, moved.values)
+        name, members = f"After {time_in_words(self._model.time)}", self.members.lines(self._model)
+        return None if excess is None or moved is None else ExcessPicture(name, excess, moved.values, members)
 
     def _that_is_there(self, field: Field | None) -> Field | None:
         """A field on the first rank without the cells of soil that is not there now. Collective."""
@@ -229,7 +234,9 @@ def begin_stage(site: ConsolidationSite, model: water.Consolidation, files: File
     if stage is None:
         return
     model.boundary = list(stage.boundary.values())
-    model.reconfigure(off=stage.off, duration=stage.duration)
+    if stage.renewed:
+        model.reconfigure(off=stage.off, members={k: v for k, v in stage.members.items() if k not in stage.renewed})
+    model.reconfigure(off=stage.off, duration=stage.duration, members=dict(stage.members))
     if files.particles is not None:
         files.particles.begin(stage)
 
@@ -271,6 +278,7 @@ def drawn(site: ConsolidationSite, files: Files, folder: Path) -> Pictures:
             stages,
         ),
     }
+    pictures |= files.members.pictures(folder, history, since, stages)
     moving = [picture for picture in files.film if picture is not None]
     if len(moving) > 1:
         pictures["film"] = lambda: save_excess_film(folder / "film", moving)
@@ -288,6 +296,8 @@ CAPTIONS = {
     "settlement": "Settlement of the points of the site over time",
     "largest_excess": "Largest excess pore pressure over time",
     "particles_excess": "Excess pore pressure of the particles when it is largest",
+    "axial_forces": "Largest axial force of each member over time; tension is positive",
+    "moments": "Largest bending moment of each beam over time",
 }
 
 
@@ -310,6 +320,7 @@ def main(arguments: list[str] | None = None) -> int:
             particles = stack.enter_context(ParticleGround(site, model, a.particles_per_cell, a.nmd, folder))
         files = stack.enter_context(Files(model, site, folder, particles, a.film))
         files.row()
+        files.members.frame(model)
         stopped = follow(a, site, model, files)
     history = files.history
     summary = {
@@ -318,7 +329,7 @@ def main(arguments: list[str] | None = None) -> int:
         "largest_excess_pressure_Pa": history["largest_excess_pressure_Pa"].max(),
         "least_excess_pressure_Pa": history["least_excess_pressure_Pa"].min(),
         "largest_water_error_m2": np.abs(history["water_error_m2"]).max(),
-        "last_time_days": model.time / DAY, "steps": len(history) - 1, "wall_seconds": perf_counter() - start,
+        **files.members.largest(history), "last_time_days": model.time / DAY, "steps": len(history) - 1, "wall_seconds": perf_counter() - start,
     }  # fmt: skip
     movies = []
     if particles is not None:
@@ -328,7 +339,8 @@ def main(arguments: list[str] | None = None) -> int:
         summary |= {"particles": particles.count, "largest_newton_iterations_particles": particles.iterations}
         if particles.scene is not None:
             movies = [particle_movie("particles", particles.scene, particles.frames, {"displacement": DISPLACEMENT})]
-    page = Page(movies=movies, slider=("t", "days"), captions=CAPTIONS)
+    files.members.write(folder, comm)
+    page = Page(movies=movies, slider=("t", "days"), captions=captions(files.members.frames) | CAPTIONS)
     lines = []
     for name in site.points:
         theirs = f", particles {1e3 * summary[f'settlement_{name}_particles_m']:.4g} mm" if a.particles else ""

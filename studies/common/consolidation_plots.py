@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import cycle
 from pathlib import Path
 
@@ -18,18 +18,22 @@ from matplotlib.tri import LinearTriInterpolator, Triangulation
 from .animation import save_figure_film
 from .field_plots import Field
 from .figures import curve_figure, label_axes, panel_figure, save_figure
-from .plots import CURVES, ROUND_TICKS, Quantity, paper_style
+from .plots import CURVES, MEMBER, ROUND_TICKS, Quantity, paper_style
 
 EXCESS = Quantity("Excess pore pressure", "kPa", scale=1e-3, colours="viridis")
 
 
 @dataclass
 class ExcessPicture:
-    """Excess pore pressure [Pa] at a time, and where the corners have moved (n, 2) [m], on the first rank."""
+    """Excess pore pressure [Pa] at a time, and displacements of the corners (n, 2) [m], on the first rank.
+
+    members: nodes (k, 2) [m] of each structural member, and their displacements [m]
+    """
 
     name: str
     excess: Field
     moved: np.ndarray
+    members: Sequence[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -91,6 +95,8 @@ def _draw_excess(axes: Axes, picture: ExcessPicture, enlarged: float, levels: np
         axes.tricontour(triangles, values, levels[1:-1], colors="black", linewidths=0.3, alpha=0.6)
     segments = Field(moved, field.cells, field.values).outline
     axes.add_collection(LineCollection(segments, colors="black", linewidths=0.8))
+    lines = [nodes + enlarged * displaced for nodes, displaced in picture.members]
+    axes.add_collection(LineCollection(lines, colors=MEMBER, linewidths=1.6, capstyle="butt"), autolim=False)
     axes.set_title(picture.name, loc="left", pad=3, fontsize=9)
 
 

@@ -10,11 +10,12 @@
     [pressures]                        # Pa on a boundary, beside that of reservoirs: a number, or rows [days, Pa]
     [points]                           # name = [x, y]: places whose settlements are followed
 
-    [[stages]]                         # soil that is placed and dug away while the ground consolidates
+    [[stages]]                         # soil and members that come and go while the ground consolidates
     day = 30.0
     duration = 10.0                    # days in which its weight comes or goes; 0 by default: at once
     fill = ["layer 1"]                 # soils of the mesh that are there from now on, and excavate = [...] that are not
     boundaries.ground.reservoir = 0.0  # what the water does from now on, where that changes
+    install = ["wall"]                 # tables [members.NAME], and remove = [...]
 """
 
 from __future__ import annotations
@@ -30,14 +31,15 @@ from mpm_core.law_warnings import with_inner_laws
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import water
+from fenics_bridge.fem.active_cells import cells_there
 from fenics_bridge.fem.evaluate import PointSearch
-from fenics_bridge.mesh.names import known_tags
+from fenics_bridge.mesh.names import known_tags, tag_numbers
 from fenics_bridge.water.boundary import value_at
 
 from .consolidation_stages import GroundStage, Table, pressure_table, stages_of
 from .checks import say
 from .site_doubts import warn_of_reservoirs
-from .site_file import CHANGES, Site, part_of_mesh, site_of, warn_of_members
+from .site_file import CHANGES, Site, part_of_mesh, site_of
 from .site_flow import boundary_of, wet_soils
 from .site_keys import DAY, changes_of
 from .slope_case import GRAVITY
@@ -117,6 +119,8 @@ class ConsolidationSite:
     def at_rest(self, element: water.Element, nmd: bool = False) -> water.Consolidation:
         """The ground at the beginning: in equilibrium under its weight, the pressures at time 0 and the steady flow. Collective.
 
+        Members of the beginning are there as weight and pressures come.
+
         Above the water table its water has the suction of the steady flow, which saturated soil bears.
 
         Args:
@@ -153,7 +157,8 @@ class ConsolidationSite:
             options_prefix="rest_",
         )
         pressure = flow.pore_pressure(suction=True)
-        fem.reconfigure(off=off, pore_pressure=pressure)
+        self._require_members(fem)
+        fem.reconfigure(off=off, pore_pressure=pressure, members=dict(self.stages[0].members))
         fem.solve(self.load(0.0))
         if not fem.converged:
             raise mpm.RunError("the ground has no equilibrium under its weight and the initial pressures")
@@ -162,6 +167,19 @@ class ConsolidationSite:
         model.reconfigure(off=off)
         model.initialise(fem, pressure)
         return model
+
+    def _require_members(self, fem: bridge.QuasiStatic) -> None:
+        """Require that the members of all stages are in soil that is there then. Collective.
+
+        Raises:
+            InputError: one is not.
+        """
+        domain, cell_tags, _ = self.mesh
+        for stage in self.stages:
+            off = tag_numbers(domain.comm, cell_tags, stage.off, "off", "cell") if stage.off else ()
+            fem.require_members(
+                dict(stage.members), cells_there(domain, cell_tags, off) if off else None, f"stage {stage.name!r}: "
+            )
 
     def particles(self, fem: water.Consolidation, per_cell: int, nmd: bool = False) -> mpm.Model:
         """Implicit particles with pore water in the place of finite elements at rest, in equilibrium. Collective.
@@ -172,8 +190,8 @@ class ConsolidationSite:
         Soil without conductivity has pore water too, without pressure (`water.waterless_facets`).
 
         Raises:
-            InputError: the water has a boundary condition other than reservoirs, or a stage places soil with conductivity, or digs
-                soil away in the course of time.
+            InputError: the water has a boundary condition other than reservoirs, there are structural members, or a stage places
+                soil with conductivity, or digs soil away in the course of time.
         """
         self._require_stages_of_particles()
         dry = [soil for soil, porous in self.soils.items() if porous is None]
@@ -209,6 +227,10 @@ class ConsolidationSite:
         return porous.porosity, vertical_conductivity(porous)
 
     def _require_stages_of_particles(self) -> None:
+        if member := next((name for stage in self.stages for name in stage.members), None):
+            raise mpm.InputError(
+                f"particles: there is the member {member!r}, expected none: implicit particles have no members"
+            )
         for before, stage in zip(self.stages, self.stages[1:]):
             wet = [soil for soil in before.off if soil not in stage.off and self.soils[soil] is not None]
             if wet:
@@ -240,16 +262,15 @@ def read_consolidation_site(
     """
     table = read_water_table(path, needed=("boundaries", "points"))
     soils, rows = wet_soils(table, path, POROUS), table.get("stages", [])
-    changes = changes_of(rows, [key for key in CHANGES if key != "excavate"])
+    changes = changes_of(rows, [key for key in CHANGES if key not in ("excavate", "install", "remove")])
     if changes:
         say(f"{path}: this study leaves out {changes}")
-    warn_of_members(table, path)
     site = site_of(effective_laws(table), path, comm, cell_size)
     mesh = part_of_mesh((site.domain, site.cell_tags, site.facet_tags), soils)
     for name in pressures or {}:
         if name not in mesh[2].names:
             raise mpm.InputError(f"--pressures names '{name}', expected some of {', '.join(mesh[2].names)}")
-    stages = stages_of(rows, list(soils), boundary_of(table, path), f"{path}: stages")
+    stages = stages_of(rows, list(soils), boundary_of(table, path), f"{path}: stages", site.members)
     conditions = {id(one): one for stage in stages for one in stage.boundary.values()}  # each once
     warn_of_reservoirs(mesh[0], conditions.values(), path)
     given = {name: pressure_table(one, f"{path}: pressures.{name}") for name, one in table.get("pressures", {}).items()}

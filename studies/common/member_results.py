@@ -20,6 +20,7 @@ import mpm_core as mpm
 from .files import OutputError, write_text
 from .figures import Pictures, curve_figure
 from .plots import CURVES
+from .site_keys import DAY
 
 COLUMNS = (
     "stage", "name", "member", "x_m", "y_m", "displacement_x_m", "displacement_y_m", "axial_force_N_per_m",
@@ -32,11 +33,12 @@ BEAM = "displacement across its line, bending moment, shear force and axial forc
 
 @dataclass
 class StageForces:
-    """Forces of the members after a stage: its number and name, and the forces by the name of each member."""
+    """Forces of the members after a stage or at a time [s]: its number and name, and the forces by the name of each member."""
 
     number: int
     name: str
     forces: dict[str, mpm.MemberForces]
+    time: float | None = None
 
 
 def stage_forces(site: bridge.FemSite, name: str) -> StageForces:
@@ -86,7 +88,10 @@ def at_nodes(per_segment: np.ndarray) -> np.ndarray:
 
 
 def write_members(folder: Path, stages: list[StageForces], comm: MPI.Comm) -> None:
-    """Write ``members.csv``, and the series ``members`` of the nodes for ParaView, where there are members. Collective."""
+    """Write ``members.csv``, and the series ``members`` of the nodes for ParaView, where there are members. Collective.
+
+    Stages with a time have it in the table, in days, and in the series, in seconds, in the place of their number.
+    """
     if not any(stage.forces for stage in stages):
         return
     on_first_rank(comm, lambda: write_text(folder / "members.csv", _table(stages)), OutputError)
@@ -97,7 +102,10 @@ def write_members(folder: Path, stages: list[StageForces], comm: MPI.Comm) -> No
             ]
             fields = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
             mine = slice(None) if comm.rank == 0 else slice(0)
-            output.write(float(stage.number), {name: values[mine] for name, values in fields.items()})
+            output.write(
+                float(stage.number) if stage.time is None else stage.time,
+                {name: values[mine] for name, values in fields.items()},
+            )
 
 
 def member_pictures(stages: list[StageForces], folder: Path) -> Pictures:
@@ -179,12 +187,15 @@ def save_axial_forces(path: Path, names: list[str], stages: list[StageForces]) -
 def _table(stages: list[StageForces]) -> str:
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(COLUMNS)
+    timed = any(stage.time is not None for stage in stages)
+    rows.writerow((*COLUMNS[:2], *(["time_days"] if timed else []), *COLUMNS[2:]))
     for stage in stages:
         for name, forces in stage.forces.items():
             values = np.column_stack([forces.positions, forces.displacement, at_nodes(forces.axial_force),
                                       at_nodes(forces.shear_force), forces.moment])  # fmt: skip
-            rows.writerows([stage.number, stage.name, name, *(f"{value:.6g}" for value in row)] for row in values)
+            days = [] if stage.time is None else [f"{stage.time / DAY:.9g}"]
+            start = [stage.number, stage.name, *days, name]
+            rows.writerows([*start, *(f"{value:.6g}" for value in row)] for row in values)
     return text.getvalue()
 
 

@@ -203,8 +203,8 @@ def warn_of_members(table: dict[str, Any], path: Path) -> None:
     """Warn of the structural members of a file for a study that has none."""
     if table.get("members"):
         names = ", ".join(map(repr, table["members"]))
-        say(f"{path}: the structural members {names} are left out here; the studies safety, collapse, slope, excavation and embankment have "
-            "them")  # fmt: skip
+        say(f"{path}: the structural members {names} are left out here; the studies safety, collapse, slope, excavation, embankment "
+            "and consolidation have them")  # fmt: skip
 
 
 def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = None) -> Site:
