@@ -284,7 +284,7 @@ class Consolidation(ConsolidationResults):
         With inertia only members may change.
 
         Args:
-            off: cell tags or names of the soils that are not there; all others are.
+            off: cell tags or names of the soils that are not there from now on; all others are, also where only members change.
             supports: boundary conditions, as for the constructor, from where the nodes are now; None for the present ones.
             pore_pressure: function of positions (n, D) [m] that returns the pressures (n,) [Pa] with which nodes come that have
                 had none; None for zero.

@@ -49,7 +49,9 @@ def set_initial_state(model: Any, stress: Any, pore_pressure: Any) -> None:
 def _members_of(model: Any, fem: QuasiStatic) -> Any:
     """The structural members of finite elements with their forces, for `Members.change`. Collective."""
     absent = [name for name, member in model.members.items() if fem.members.get(name) != member]
-    missing = f"stress is a QuasiStatic without the member {absent[0]!r} of this model, expected it there" if absent else None
+    missing = (
+        f"stress is a QuasiStatic without the member {absent[0]!r} of this model, expected it there" if absent else None
+    )
     agree(model.domain.comm, missing)
     return model._members.taken_over(fem._members, model._there if len(model.off) else None)
 

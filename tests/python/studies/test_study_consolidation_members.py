@@ -169,8 +169,14 @@ def test_members_of_the_beginning_are_in_equilibrium_with_the_ground(tmp_path):
 @pytest.mark.parametrize(
     ("stages", "words"),
     [
-        ("[[stages]]\nday = 1\ninstall = 'pile'", r"stages\[0\]: 'pile' is not among the tables \[members.NAME\]: bar, prop"),
-        ("[[stages]]\nday = 1\nremove = 'bar'", r"stages\[0\]: remove names the member 'bar', which is not there before"),
+        (
+            "[[stages]]\nday = 1\ninstall = 'pile'",
+            r"stages\[0\]: 'pile' is not among the tables \[members.NAME\]: bar, prop",
+        ),
+        (
+            "[[stages]]\nday = 1\nremove = 'bar'",
+            r"stages\[0\]: remove names the member 'bar', which is not there before",
+        ),
         (
             "[[stages]]\nday = 1\ninstall = 'bar'\n[[stages]]\nday = 2\ninstall = 'bar'",
             r"stages\[1\]: install names the member 'bar', which is there before this stage",
