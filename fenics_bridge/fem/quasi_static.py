@@ -124,7 +124,7 @@ class QuasiStatic(ReinforcedBody, WetBody, SupportedBody, PointFunctions):
         """The boundary conditions in force"""
         self._loads = LoadVectors(space, facet_tags, cell_tags, radius=self.radius)
         self._water: PrescribedWater | None = None
-        self._members = Members(unknowns_of(space))
+        self._members = Members(unknowns_of(space), self.radius is not None)
         self._materials = Materials(domain, law, cell_tags)
         quadrature = max(1, 2 * (degree - 1))
         axisymmetric = self.radius is not None

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from mpm_core.members import Member, MemberForces
+from mpm_core.members import Member, MemberForces, MemberStrains
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
@@ -25,13 +25,10 @@ class _Installed:
 
     member: Member
     nodes: NDArray[np.float64]
-    segments: int
-    bends_at: tuple[tuple[int, ...], ...]
-    """Nodes at which it bends, of each moment"""
-    lengths: NDArray[np.float64]
-    """Length over which each strain acts [m], (k,)"""
+    strains: MemberStrains
+    """Its strains by the displacements of its nodes"""
     force: NDArray[np.float64]
-    """Axial force of each segment [N], then moment where it bends [N m], (k,)"""
+    """Force of each strain: axial force of each segment [N], then moment where it bends [N m], (k,)"""
     origin: Any
     """Displacement of the nodes at the installation [m], (n, D); None before it"""
     stressing: bool
@@ -44,11 +41,11 @@ class _Installed:
     def stiffness(self) -> NDArray[np.float64]:
         """Elastic stiffness of each strain: (k,)."""
         axial = 0.0 if self.stressing else self.member.axial_stiffness
-        return np.where(self._is_axial(), axial, self.member.bending_stiffness)
+        return np.where(self.strains.is_axial, axial, self.member.bending_stiffness)
 
     def respond(self, strain: NDArray[np.float64]) -> tuple[NDArray[np.float64], Any]:
         """Forces after a strain increment (k,), within the strength of member and bond, and their derivatives (k, k)."""
-        axial, member, stiffness = self._is_axial(), self.member, self.stiffness()
+        axial, member, stiffness = self.strains.is_axial, self.member, self.stiffness()
         elastic = self.force + stiffness * strain
         least = np.where(axial, -member.compressive_strength, -member.plastic_moment)
         largest = np.where(axial, member.tensile_strength, member.plastic_moment)
@@ -56,25 +53,22 @@ class _Installed:
         tangent = sparse.diags(np.where(force == elastic, stiffness, 0.0))
         if np.isinf(member.bond_strength) or self.stressing:
             return force, tangent
-        n = self.segments
-        bond = bond_strengths(member, self.lengths[:n])
-        force[:n] = _core.forces_with_slip(elastic[:n], stiffness[:n] / self.lengths[:n], least[:n], largest[:n], bond)
-        slipping = slip_tangent(force[:n], (least[:n], largest[:n]), bond, self.lengths[:n])
+        n, lengths = self.strains.segments, self.strains.lengths[: self.strains.segments]
+        bond = bond_strengths(member, lengths)
+        force[:n] = _core.forces_with_slip(elastic[:n], stiffness[:n] / lengths, least[:n], largest[:n], bond)
+        slipping = slip_tangent(force[:n], (least[:n], largest[:n]), bond, lengths)
         return force, sparse.block_diag([stiffness[:n, None] * slipping, tangent.tocsr()[n:, n:]])
 
     def places(self) -> Any:
         """1 where a force may depend on a strain, otherwise 0: (k, k). In a bar that slips all may depend on all."""
-        places = np.eye(len(self.lengths))
+        places, n = np.eye(len(self.force)), self.strains.segments
         if np.isfinite(self.member.bond_strength):
-            places[: self.segments, : self.segments] = 1.0
+            places[:n, :n] = 1.0
         return places
 
     def unstrained(self) -> NDArray[np.float64]:
         """Forces without strain: the prestress."""
-        return np.where(self._is_axial(), self.member.prestress, 0.0)
-
-    def _is_axial(self) -> NDArray[np.bool_]:
-        return np.arange(len(self.lengths)) < self.segments
+        return np.where(self.strains.is_axial, self.member.prestress, 0.0)
 
 
 class Members:
@@ -87,9 +81,11 @@ class Members:
 
     Args:
         unknowns: the unknowns of the body.
+        of_revolution: whether the body is axisymmetric, and beams are shells of revolution in it.
     """
 
-    def __init__(self, unknowns: Unknowns) -> None:
+    def __init__(self, unknowns: Unknowns, of_revolution: bool = False) -> None:
+        self._of_revolution = of_revolution
         self._unknowns, self._space, self._comm = unknowns, unknowns.space, unknowns.space.mesh.comm
         self._first, self._n = unknowns.first, unknowns.size
         self.n_own = unknowns.own
@@ -153,7 +149,7 @@ class Members:
             there = prepared.values()
             self._strains = sparse.vstack([one.strain for one in there]).tocsr()
             self._own_strains = self._own(self._strains)
-            self._lengths = np.concatenate([one.lengths for one in there])
+            self._lengths = np.concatenate([one.strains.lengths for one in there])
             depends = sparse.block_diag([one.places() for one in there])
             self._places = self._matrix(0.0 * (abs(self._own_strains).T @ depends @ abs(self._strains)))
         self.back()
@@ -236,11 +232,12 @@ class Members:
             displacement: this rank's own unknowns.
         """
         one = self._there[name]
-        moment = np.zeros(len(one.nodes))
-        for at, value in zip(one.bends_at, one.force[one.segments :]):
+        strains, moment = one.strains, np.zeros(len(one.nodes))
+        for at, value in zip(strains.bends_at, one.force[strains.segments :]):
             moment[list(at)] = value
         moved = self._moved(one, displacement) - one.origin
-        return MemberForces(one.nodes, moved, one.force[: one.segments].copy(), moment)
+        hoops = [one.force[rows].copy() for rows in strains.of_hoops] if strains.hoops else (None, None)
+        return MemberForces(one.nodes, moved, one.force[: strains.segments].copy(), moment, *hoops)
 
     def moved(self, name: str, displacement: NDArray[np.float64]) -> Any:
         """Displacements of a member's nodes, those of the soil before its installation among them (n, D) [m]. Collective.
@@ -258,10 +255,8 @@ class Members:
     def _installed(self, member: Member, size: float) -> _Installed:
         """A member without any strain; size: of the cells around it [m]."""
         nodes = member.nodes(size / min(2, compat.degree_of(self._space)) or member.length)
-        strains = member.strains(nodes)
-        one = _Installed(
-            member, nodes, strains.segments, strains.bends_at, strains.lengths, np.zeros(0), None, member.prestress != 0
-        )
+        strains = member.strains(nodes, self._of_revolution)
+        one = _Installed(member, nodes, strains, np.zeros(0), None, member.prestress != 0)
         one.force = one.unstrained()
         return one
 
@@ -287,7 +282,7 @@ class Members:
         rows = np.broadcast_to(rows, (len(dofs), dim, dofs.shape[1]))
         values = np.broadcast_to(weights[:, None, :], rows.shape)
         one.movement = sparse.csr_matrix((values.ravel(), (rows.ravel(), columns)), (count * dim, self._n))
-        operator = one.member.strains(one.nodes).operator
+        operator = one.strains.operator
         one.strain = sparse.csr_matrix(operator.reshape(len(operator), -1)) @ one.movement
 
     def _own(self, matrix: Any) -> Any:
@@ -339,8 +334,8 @@ class Members:
     def _by_member(self, values: NDArray[np.float64]) -> Iterator[tuple[_Installed, NDArray[np.float64]]]:
         start = 0
         for one in self._there.values():
-            yield one, values[start : start + len(one.lengths)]
-            start += len(one.lengths)
+            yield one, values[start : start + len(one.force)]
+            start += len(one.force)
 
 
 def _named(name: str, member: Member) -> str:

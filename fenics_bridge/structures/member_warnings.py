@@ -44,11 +44,12 @@ def warn_of_members(members: Members, held: NDArray[np.integer], before: set[str
 
 def _rigid(one: Any) -> float:
     """Fraction of a beam's nodes at which it cannot bend, as all three nodes beside are in one linear element [-]."""
-    curvature = abs(one.strain[one.segments :])
+    strains, longest = one.strains, np.linalg.norm(np.diff(one.nodes, axis=0), axis=1).max()
+    curvature = abs(one.strain[strains.segments : strains.segments + len(strains.bends_at)])
     if curvature.shape[0] == 0:
         return 0.0
     largest = np.asarray(curvature.max(axis=1).todense()).ravel()
-    return float(np.mean(largest < 1e-6 / np.max(one.lengths) ** 2))
+    return float(np.mean(largest < 1e-6 / longest**2))
 
 
 def _hinge(name: str, one: Any, is_held: NDArray[np.float64]) -> str:

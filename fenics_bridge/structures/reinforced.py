@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from mpm_core.members import Member, MemberForces
@@ -48,7 +49,7 @@ class ReinforcedBody:
             where: what begins the message.
 
         Raises:
-            InputError: a member of another dimension, in an axisymmetric body, or in no soil. Raised on all ranks alike.
+            InputError: a member of another dimension, one that is no shell in an axisymmetric body, or one in no soil. Raised on all ranks alike.
         """
         self._prepared_members(members, active, where)
 
@@ -57,8 +58,8 @@ class ReinforcedBody:
         comm, dim = self.domain.comm, self.domain.geometry.dim
         other = next((name for name, member in members.items() if member.dim != dim), None)
         wrong = None if other is None else f"{other!r} has {members[other].dim} dimensions, expected {dim}"
-        if members and self.radius is not None:
-            wrong = "there are some in an axisymmetric body, expected plane strain or three dimensions"
+        if self.radius is not None:
+            wrong = wrong or next(filter(None, (_no_shell(name, one) for name, one in members.items())), None)
         if members and getattr(self._body.kinematics, "factored", False):
             wrong = (
                 f"there are some with nmd=True in more than {AVERAGED_LIMIT} nodes of three dimensions, expected degree=2, or the "
@@ -81,3 +82,12 @@ class ReinforcedBody:
     def _own_unknowns(self) -> Any:
         """This rank's own unknowns at the last step accepted."""
         return self._body.solution.x.array[: self._members.n_own]
+
+
+def _no_shell(name: str, member: Member) -> str | None:
+    """Why a member cannot be a shell of revolution about x = 0, in words; None if it can."""
+    if not member.bending_stiffness or member.bond_strength < math.inf:
+        kind = "a beam with a bond_strength" if member.bending_stiffness else "no beam"
+        return f"{name!r} is {kind} in an axisymmetric body, expected beams without it: shells of revolution"
+    least = min(x for x, _ in member.points)
+    return f"{name!r} reaches to x = {least:g} m in an axisymmetric body, expected 0 or more" if least < 0 else None

@@ -174,7 +174,7 @@ class Consolidation(ConsolidationResults):
     def _assemble(self, inertia: Newmark | None) -> None:
         """Put together what does not depend on the water's boundary conditions, then what does. Collective."""
         solution, increment = fem.Function(self._space), fem.Function(self._space)
-        self._members = Members(unknowns_of(self._space, *self._displacements))
+        self._members = Members(unknowns_of(self._space, *self._displacements), self.radius is not None)
         self._body = Body(solution, increment, self.points, None, None, None, self._members)
         maps = [(part.dofmap, dofs) for part, dofs in (self._displacements, self._pressures)]
         self._owned = [dofs[: m.index_map.size_local * m.index_map_bs] for m, dofs in maps]

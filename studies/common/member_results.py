@@ -26,6 +26,8 @@ COLUMNS = (
     "stage", "name", "member", "x_m", "y_m", "displacement_x_m", "displacement_y_m", "axial_force_N_per_m",
     "shear_force_N_per_m", "moment_N_m_per_m",
 )  # fmt: skip
+HOOPS = ("hoop_force_N_per_m", "hoop_moment_N_m_per_m")
+"""Further columns of members of axisymmetric bodies"""
 LEGEND_COLUMNS = 4
 """Stages beside one another in the legend of a beam"""
 BEAM = "displacement across its line, bending moment, shear force and axial force"
@@ -73,7 +75,9 @@ def force_row(members: Mapping[str, mpm.Member], forces: Mapping[str, mpm.Member
     axial = {axial_column(name): largest(one.axial_force) for name, one in forces.items()}
     beams = {name: one for name, one in forces.items() if members[name].bending_stiffness}
     moments = {moment_column(name): largest(one.moment) for name, one in beams.items()}
-    return axial | moments | {shear_column(name): largest(one.shear_force) for name, one in beams.items()}
+    hoops = {f"{name.replace(' ', '_')}_{column}": largest(values) for name, one in beams.items()
+             for column, values in zip(HOOPS, (one.hoop_force, one.hoop_moment)) if values is not None}  # fmt: skip
+    return axial | moments | {shear_column(name): largest(one.shear_force) for name, one in beams.items()} | hoops
 
 
 def largest(values: np.ndarray) -> float:
@@ -95,10 +99,11 @@ def write_members(folder: Path, stages: list[StageForces], comm: MPI.Comm) -> No
     if not any(stage.forces for stage in stages):
         return
     on_first_rank(comm, lambda: write_text(folder / "members.csv", _table(stages)), OutputError)
+    shells = _has_shells(stages)
     with ParticleOutput(folder / "members", comm) as output:
         for stage in stages:
-            parts = [_fields(forces, number) for number, forces in enumerate(stage.forces.values())] or [
-                _fields(None, 0)
+            parts = [_fields(forces, number, shells) for number, forces in enumerate(stage.forces.values())] or [
+                _fields(None, 0, shells)
             ]
             fields = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
             mine = slice(None) if comm.rank == 0 else slice(0)
@@ -138,8 +143,10 @@ def save_beam(path: Path, name: str, stages: list[StageForces]) -> None:
     shown = [stage for stage in stages if name in stage.forces]
     extent = np.ptp(shown[0].forces[name].positions, axis=0)
     upright = bool(extent[1] >= extent[0])
-    rows, columns = (1, 4) if upright else (4, 1)
-    with curve_figure(path, (6.9, 4.0) if upright else (5.4, 7.4), columns, rows) as panels:
+    count = 4 if shown[0].forces[name].hoop_force is None else 6
+    rows, columns = (1, count) if upright else (count, 1)
+    size = (6.9 * count / 4, 4.0) if upright else (5.4, 7.4 * count / 4)
+    with curve_figure(path, size, columns, rows) as panels:
         for k, stage in enumerate(shown):
             forces = stage.forces[name]
             along, place = (1, "Height [m]") if upright else (0, "x [m]")
@@ -154,6 +161,9 @@ def save_beam(path: Path, name: str, stages: list[StageForces]) -> None:
                 "Shear force [kN/m]": (1e-3 * np.repeat(forces.shear_force, 2), ends),
                 "Axial force [kN/m]": (1e-3 * np.repeat(forces.axial_force, 2), ends),
             }
+            if forces.hoop_force is not None and forces.hoop_moment is not None:
+                curves["Hoop force [kN/m]"] = (1e-3 * np.repeat(forces.hoop_force, 2), ends)
+                curves["Hoop moment [kN m/m]"] = (1e-3 * np.repeat(forces.hoop_moment, 2), ends)
             style = {"color": CURVES[k % len(CURVES)], "linewidth": 1.1, "label": stage.name, "marker": ""}
             for axes, (label, (values, where)) in zip(panels, curves.items()):
                 axes.plot(*((values, where) if upright else (where, values)), **style)
@@ -188,24 +198,31 @@ def _table(stages: list[StageForces]) -> str:
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     timed = any(stage.time is not None for stage in stages)
-    rows.writerow((*COLUMNS[:2], *(["time_days"] if timed else []), *COLUMNS[2:]))
+    hoops = HOOPS if _has_shells(stages) else ()
+    rows.writerow((*COLUMNS[:2], *(["time_days"] if timed else []), *COLUMNS[2:], *hoops))
     for stage in stages:
         for name, forces in stage.forces.items():
+            around = [at_nodes(one) for one in (forces.hoop_force, forces.hoop_moment) if one is not None]
             values = np.column_stack([forces.positions, forces.displacement, at_nodes(forces.axial_force),
-                                      at_nodes(forces.shear_force), forces.moment])  # fmt: skip
+                                      at_nodes(forces.shear_force), forces.moment, *around])  # fmt: skip
             days = [] if stage.time is None else [f"{stage.time / DAY:.9g}"]
             start = [stage.number, stage.name, *days, name]
             rows.writerows([*start, *(f"{value:.6g}" for value in row)] for row in values)
     return text.getvalue()
 
 
-def _fields(forces: mpm.MemberForces | None, number: int) -> dict[str, np.ndarray]:
-    """Fields of the nodes of a member; none of them where there is no member."""
+def _has_shells(stages: list[StageForces]) -> bool:
+    """Whether there are members of axisymmetric bodies, with forces around the axis."""
+    return any(forces.hoop_force is not None for stage in stages for forces in stage.forces.values())
+
+
+def _fields(forces: mpm.MemberForces | None, number: int, shells: bool) -> dict[str, np.ndarray]:
+    """Fields of the nodes of a member; none of them where there is no member. shells: whether there are forces around an axis."""
+    scalars = ("axial_force", "shear_force", "moment", *(("hoop_force", "hoop_moment") if shells else ()))
     if forces is None:
-        return {"position": np.zeros((0, 2)), "displacement": np.zeros((0, 2)), "member": np.zeros(0, dtype=int),
-                "axial_force": np.zeros(0), "shear_force": np.zeros(0), "moment": np.zeros(0)}  # fmt: skip
-    return {
-        "position": forces.positions, "displacement": forces.displacement,
-        "member": np.full(len(forces.positions), number), "axial_force": at_nodes(forces.axial_force),
-        "shear_force": at_nodes(forces.shear_force), "moment": forces.moment,
-    }  # fmt: skip
+        empty = {"position": np.zeros((0, 2)), "displacement": np.zeros((0, 2)), "member": np.zeros(0, dtype=int)}
+        return empty | {name: np.zeros(0) for name in scalars}
+    places = {"position": forces.positions, "displacement": forces.displacement}
+    values = {name: getattr(forces, name) for name in scalars}
+    at = {name: one if name == "moment" else at_nodes(one) for name, one in values.items()}
+    return {**places, "member": np.full(len(forces.positions), number), **at}

@@ -281,10 +281,17 @@ class MemberStrains:
     """Number of hoop strains, which come last, followed by as many hoop curvatures"""
 
     @property
+    def of_hoops(self) -> tuple[slice, slice]:
+        """Where the hoop strains and the hoop curvatures are."""
+        end = len(self.lengths)
+        return slice(end - 2 * self.hoops, end - self.hoops), slice(end - self.hoops, end)
+
+    @property
     def is_axial(self) -> NDArray[np.bool_]:
         """Which strains are changes of length, rather than curvatures: (k,)."""
-        place, last = np.arange(len(self.lengths)), len(self.lengths) - self.hoops
-        return (place < self.segments) | ((place >= last - self.hoops) & (place < last))
+        axial = np.arange(len(self.lengths)) < self.segments
+        axial[self.of_hoops[0]] = True
+        return axial
 
 
 def member_strains(
@@ -352,8 +359,13 @@ def shell_strains(strains: MemberStrains, nodes: NDArray[np.float64]) -> MemberS
     halves[:-1] += lengths / 4 * (nodes[:-1, 0] + middle)
     halves[1:] += lengths / 4 * (middle + nodes[1:, 0])
     bending = [sum(halves[list(at)]) for at in strains.bends_at]
+    # Rotations are linear between the middles of segments and fall to zero at a clamped end: a quarter of a segment has none there.
+    turned = areas.copy()
+    for at in (0, -1):
+        if (at % n,) in strains.bends_at:
+            turned[at] *= 0.75
     operator = np.concatenate([strains.operator, hoop, turn])
-    weights = np.concatenate([areas, bending, areas, areas])
+    weights = np.concatenate([areas, bending, areas, turned])
     return MemberStrains(operator, weights, strains.segments, strains.bends_at, n - 1)
 
 
@@ -386,13 +398,23 @@ class MemberForces:
 
     @property
     def shear_force(self) -> NDArray[np.float64]:
-        """Shear force of each segment, the change of the moment along it [N/m], shape (n - 1,)."""
-        return np.diff(self.moment) / np.linalg.norm(np.diff(self.positions, axis=0), axis=1)
+        """Shear force of each segment, the change of the moment along it [N/m], shape (n - 1,); with the hoop moment in a shell."""
+        edges = np.diff(self.positions, axis=0)
+        lengths = np.linalg.norm(edges, axis=1)
+        if self.hoop_moment is None:
+            return np.diff(self.moment) / lengths
+        radius = self.positions[:, 0]
+        change = np.diff(radius * self.moment) - edges[:, 0] * self.hoop_moment
+        return change / (lengths * (radius[1:] + radius[:-1]) / 2)
 
     def __repr__(self) -> str:
         axial = f"axial force from {self.axial_force.min():.4g} to {self.axial_force.max():.4g} N/m"
         moment = f", moment from {self.moment.min():.4g} to {self.moment.max():.4g} N m/m" if self.bends else ""
-        hoop = "" if self.hoop_force is None else f", hoop force from {self.hoop_force.min():.4g} to {self.hoop_force.max():.4g} N/m"
+        hoop = (
+            ""
+            if self.hoop_force is None
+            else f", hoop force from {self.hoop_force.min():.4g} to {self.hoop_force.max():.4g} N/m"
+        )
         return f"<MemberForces: {len(self.positions)} nodes, {axial}{moment}{hoop}>"
 
 
