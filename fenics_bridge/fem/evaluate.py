@@ -149,10 +149,24 @@ def local_cells(
     A point on the border of several cells goes to a preferred one, by a number for each cell, and among these to the one in
     which it lies deepest. It counts as inside up to a tolerance in barycentric coordinates.
     """
-    dim, n_cells = domain.geometry.dim, owned_cells(domain)
+    rows, cells, depth = cells_around(domain, points, tolerance)
     found = np.full(len(points), -1, dtype=np.int32)
+    order = np.lexsort((depth, preferred[cells], rows))
+    found[rows[order]] = cells[order]  # the deepest comes last and holds
+    return found
+
+
+def cells_around(
+    domain: Mesh, points: NDArray[np.float64], tolerance: float
+) -> tuple[NDArray[np.intp], NDArray[np.int32], NDArray[np.float64]]:
+    """All owned cells that contain points (n, D) [m], up to a tolerance in barycentric coordinates.
+
+    Returns:
+        Number of the point, cell, and smallest barycentric coordinate of the point in it, each of shape (k,).
+    """
+    dim, n_cells = domain.geometry.dim, owned_cells(domain)
     if n_cells == 0 or len(points) == 0:
-        return found
+        return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.int32), np.empty(0)
     corners = domain.geometry.x[compat.cell_nodes(domain)[:n_cells], :dim]
     padded = np.zeros((len(points), 3))
     padded[:, :dim] = points
@@ -160,10 +174,8 @@ def local_cells(
     offsets, cells = compat.candidate_cells(domain, np.arange(n_cells), padded, tolerance * size)
     rows = np.repeat(np.arange(len(points)), np.diff(offsets))
     depth = _depth(corners[cells], points[rows])
-    order = np.lexsort((depth, preferred[cells], rows))
-    order = order[depth[order] >= -tolerance]
-    found[rows[order]] = cells[order]  # the deepest comes last and holds
-    return found
+    near = depth >= -tolerance
+    return rows[near], cells[near], depth[near]
 
 
 def _depth(corners: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:

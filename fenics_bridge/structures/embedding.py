@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
-from fenics_bridge.fem.evaluate import local_cells
+from fenics_bridge.fem.evaluate import cells_around, local_cells
 from fenics_bridge.mesh.tagged import owned_cells
 from fenics_bridge.structures.unknowns import Unknowns
 
@@ -57,15 +57,19 @@ class Embedding:
 
 
 def cell_sizes_along(domain: Any, lines: Sequence[NDArray[np.float64]]) -> list[float]:
-    """Median length of the edges of the cells along each line (k, D) [m]; 0 where it is outside of the mesh. Collective."""
+    """Median length of the edges of the cells along each line (k, D) [m]; 0 where it is outside of the mesh. Collective.
+
+    A line along edges of the mesh has the cells on both of its sides, on whichever rank they are.
+    """
     if not lines:
         return []
     samples = np.concatenate([samples_of(line) for line in lines])
-    cells = _active_cells(domain, samples, None).reshape(len(lines), SAMPLES)
+    rows, cells, _ = cells_around(domain, samples, TOLERANCE)
     first, second = np.triu_indices(domain.geometry.dim + 1, 1)
     sizes = []
-    for found in cells:
-        corners = domain.geometry.x[compat.cell_nodes(domain)[found[found >= 0]], : domain.geometry.dim]
+    for number in range(len(lines)):
+        found = cells[rows // SAMPLES == number]
+        corners = domain.geometry.x[compat.cell_nodes(domain)[found], : domain.geometry.dim]
         edges = np.linalg.norm(corners[:, first] - corners[:, second], axis=2)
         every = np.concatenate(domain.comm.allgather(edges.ravel()))
         sizes.append(float(np.median(every)) if len(every) else 0.0)

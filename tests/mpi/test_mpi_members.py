@@ -3,10 +3,12 @@
 import warnings
 
 import numpy as np
+import pytest
 from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from fenics_bridge.structures.embedding import cell_sizes_along
 
 COMM = MPI.COMM_WORLD
 
@@ -113,3 +115,31 @@ def test_a_member_in_no_soil_is_said_once_and_one_across_ranks_is_not():
     said = [str(one.message) for one in found if "carries nothing" in str(one.message)]
     assert len(said) == (1 if COMM.rank == 0 else 0)
     assert all("'up'" in text for text in said)
+
+
+def test_sizes_of_segments_do_not_depend_on_the_border_of_ranks():
+    """The cells along lines of which some are on the border of ranks, and some between cells of other sizes."""
+
+    def sizes(comm):
+        mesh = bridge.slope_mesh(comm, height=2.0, angle=30.0, crest=2.0, cell_size=0.3, kind="gmsh")
+        body = bridge.soil_mesh(*mesh)[0]
+        return cell_sizes_along(body, [np.array([(0.1 + 0.17 * k, 1.9), (0.2 + 0.25 * k, 0.1)]) for k in range(11)])
+
+    assert sizes(COMM) == pytest.approx(sizes(MPI.COMM_SELF), rel=1e-12)
+
+
+def test_shells_of_revolution_carry_the_same_on_all_numbers_of_ranks():
+    def forces(comm):
+        domain, _, facet_tags = bridge.box_mesh(comm, (4.0, 2.0), (16, 8))
+        soil = mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=5e3, friction_angle=30.0, dilation_angle=10.0)
+        supports = [bridge.roller(1, (1, 0)), bridge.roller(2, (1, 0)), bridge.fixed(3)]
+        fem = bridge.QuasiStatic(domain, soil, facet_tags, supports, geometry=mpm.Geometry.AXISYMMETRIC)
+        raft = mpm.beam([(0.0, 2.0), (1.5, 2.0)], 1e9, 5e6, clamped_start=True)
+        pipe = mpm.beam([(1.5, 2.0), (1.5, 1.0)], 1e9, 5e6)
+        fem.reconfigure(members={"raft": raft, "pipe": pipe})
+        fem.solve(bridge.Load(unit_weight=18e3, pressure={4: 30e3}))
+        return [getattr(fem.member_forces(name), part) for name in ("raft", "pipe")
+                for part in ("axial_force", "moment", "hoop_force", "hoop_moment")]  # fmt: skip
+
+    for values, expected in zip(forces(COMM), forces(MPI.COMM_SELF)):
+        assert np.allclose(values, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
