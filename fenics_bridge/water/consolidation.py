@@ -268,7 +268,7 @@ class Consolidation(ConsolidationResults):
 
     def reconfigure(
         self,
-        off: Sequence[int | str] = (),
+        off: Sequence[int | str] | None = None,
         supports: Sequence[Support] | None = None,
         pore_pressure: OfPosition | None = None,
         stress: OfPosition | None = None,
@@ -284,7 +284,8 @@ class Consolidation(ConsolidationResults):
         With inertia only members may change.
 
         Args:
-            off: cell tags or names of the soils that are not there from now on; all others are, also where only members change.
+            off: cell tags or names of the soils that are not there from now on, as all others are; () for none, None for those that are
+                not there now.
             supports: boundary conditions, as for the constructor, from where the nodes are now; None for the present ones.
             pore_pressure: function of positions (n, D) [m] that returns the pressures (n,) [Pa] with which nodes come that have
                 had none; None for zero.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -22,7 +23,7 @@ from fenics_bridge.mesh.tagged import owned_cells
 
 def reconfigure(
     model: Any,
-    off: Sequence[int | str],
+    off: Sequence[int | str] | None,
     supports: Any,
     pore_pressure: Any,
     stress: Any,
@@ -32,6 +33,7 @@ def reconfigure(
 ) -> None:
     """Apply the changes of `Consolidation.reconfigure`."""
     domain, points, before = model.domain, model.points, model._laws
+    off = model.off if off is None else off
     _check(model, off, duration, members_alone=all(each is None for each in (supports, pore_pressure, stress, law)))
     off = tag_numbers(domain.comm, model.cell_tags, off, "off", "cell") if len(off) else ()
     laws = before if law is None else model._materials.laws(law)
@@ -41,6 +43,7 @@ def reconfigure(
     new = np.repeat((there.x.array > 0)[points.cells] & ~was_there[points.cells], points.per_cell)
     pressures, given = _pressures(model, pore_pressure), given_stress(model, stress, new)
     prepared = model._prepared_members(model.members if members is None else members, there if len(off) else None)
+    _warn_of_walls(domain.comm, prepared)
     points.assign(np.where(there.x.array[: owned_cells(domain)] > 0, model._materials.number, -1), len(laws))
     take_over(model, new, laws, before, given)
     model._laws, model.off = laws, off
@@ -53,6 +56,18 @@ def reconfigure(
     _fill_pores(model, had_none, pressures)
     model._change_members(prepared)
     _hold(model, duration, _risen(model, was_there))
+
+
+def _warn_of_walls(comm: Any, members: Any) -> None:
+    """Warn of members that hold water back, which they do not here."""
+    names = [repr(name) for name, one in members.items() if one.member.impervious and one.origin is None]
+    if names and comm.rank == 0:
+        warnings.warn(
+            f"water flows through {', '.join(names)} in water.Consolidation, also where a beam is impervious: it holds back water in "
+            "water.Seepage, and where pore pressures are prescribed to finite elements",
+            RuntimeWarning,
+            stacklevel=4,
+        )
 
 
 def lonely_dofs(model: Any) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

@@ -71,7 +71,9 @@ def test_layers_of_fill_settle_as_the_sum_of_loads_on_terzaghis_layer(element):
     model.reconfigure(off=[SECOND])
     _run(model, 0.2)
     assert _settled(model) == pytest.approx(SETTLES * layer_settled(0.2), rel=0.01)
-    model.reconfigure()
+    model.reconfigure()  # changes nothing, nor what is not there
+    assert _settled(model) == pytest.approx(SETTLES * layer_settled(0.2), rel=0.01) and len(model.off) == 1
+    model.reconfigure(off=())
     _run(model, 0.5)
     assert _settled(model) == pytest.approx(SETTLES * (layer_settled(0.5) + layer_settled(0.3)), rel=0.01)
     model.reconfigure(off=[SECOND])  # it is taken away again

@@ -338,8 +338,14 @@ def test_members_that_do_not_fit_are_refused_and_change_nothing():
         domain, SOIL, water.PorousSoil(1e-8), facet_tags, [bridge.fixed(BASE), bridge.roller(LEFT, (1, 0))],
         [water.Head(TOP, 1.0)], geometry=mpm.Geometry.AXISYMMETRIC,
     )  # fmt: skip
-    with pytest.raises(mpm.InputError, match="members: there are some in an axisymmetric body"):
+    with pytest.raises(mpm.InputError, match="members: 'b' is no beam in an axisymmetric body"):
         round_body.reconfigure(members={"b": mpm.bar([(0.2, 0.5), (0.8, 0.5)], 1e6)})
+
+
+def test_water_that_flows_through_an_impervious_wall_is_said():
+    model = ground()
+    with pytest.warns(RuntimeWarning, match="water flows through 'wall' in water.Consolidation"):
+        model.reconfigure(members={"wall": mpm.beam([(2.0, 2.0), (2.0, 0.5)], 1e9, 2e7, impervious=True)})
 
 
 def test_a_new_beginning_leaves_members_with_their_prestress_alone():
