@@ -143,42 +143,43 @@ def save_beam(path: Path, name: str, stages: list[StageForces]) -> None:
     shown = [stage for stage in stages if name in stage.forces]
     extent = np.ptp(shown[0].forces[name].positions, axis=0)
     upright = bool(extent[1] >= extent[0])
-    count = 4 if shown[0].forces[name].hoop_force is None else 6
+    curves = [_curves(stage.forces[name], upright) for stage in shown]
+    count = max(map(len, curves))
     rows, columns = (1, count) if upright else (count, 1)
     size = (6.9 * count / 4, 4.0) if upright else (5.4, 7.4 * count / 4)
     with curve_figure(path, size, columns, rows) as panels:
         for k, stage in enumerate(shown):
-            forces = stage.forces[name]
-            along, place = (1, "Height [m]") if upright else (0, "x [m]")
-            across = forces.displacement[:, 0 if upright else 1]
-            nodes = forces.positions[:, along]
-            ends = np.column_stack(
-                [nodes[:-1], nodes[1:]]
-            ).ravel()  # of the segments, whose forces jump where a strut is
-            curves = {
-                "Displacement [mm]": (1e3 * across, nodes),
-                "Moment [kN m/m]": (1e-3 * forces.moment, nodes),
-                "Shear force [kN/m]": (1e-3 * np.repeat(forces.shear_force, 2), ends),
-                "Axial force [kN/m]": (1e-3 * np.repeat(forces.axial_force, 2), ends),
-            }
-            if forces.hoop_force is not None and forces.hoop_moment is not None:
-                curves["Hoop force [kN/m]"] = (1e-3 * np.repeat(forces.hoop_force, 2), ends)
-                curves["Hoop moment [kN m/m]"] = (1e-3 * np.repeat(forces.hoop_moment, 2), ends)
             style = {"color": CURVES[k % len(CURVES)], "linewidth": 1.1, "label": stage.name, "marker": ""}
-            for axes, (label, (values, where)) in zip(panels, curves.items()):
+            for axes, (label, (values, where)) in zip(panels, curves[k].items()):
                 axes.plot(*((values, where) if upright else (where, values)), **style)
                 (axes.set_xlabel if upright else axes.set_ylabel)(label)
                 (axes.axvline if upright else axes.axhline)(0.0, color="black", linewidth=0.5)
         if upright:
-            panels[0].set_ylabel(place)
+            panels[0].set_ylabel("Height [m]")
             for axes in panels[1:]:
                 axes.tick_params(labelleft=False)
         else:
-            panels[-1].set_xlabel(place)
+            panels[-1].set_xlabel("x [m]")
         figure, lines = panels[0].figure, -(-len(shown) // LEGEND_COLUMNS)
         room = (0.2 * lines + 0.1) / figure.get_size_inches()[1]
         figure.get_layout_engine().set(rect=(0, 0, 1, 1 - room))
         figure.legend(*panels[0].get_legend_handles_labels(), loc="upper center", ncol=LEGEND_COLUMNS, fontsize=8)
+
+
+def _curves(forces: mpm.MemberForces, upright: bool) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Values and places of the curves of a beam by their labels, over its height or along x; hoop moments of plates alone."""
+    nodes = forces.positions[:, 1 if upright else 0]
+    ends = np.column_stack([nodes[:-1], nodes[1:]]).ravel()  # of the segments, whose forces jump where a strut is
+    curves = {
+        "Displacement [mm]": (1e3 * forces.displacement[:, 0 if upright else 1], nodes),
+        "Moment [kN m/m]": (1e-3 * forces.moment, nodes),
+    }
+    segments = {"Shear force [kN/m]": forces.shear_force, "Axial force [kN/m]": forces.axial_force}
+    if forces.hoop_force is not None and forces.hoop_moment is not None:
+        segments["Hoop force [kN/m]"] = forces.hoop_force
+        if np.ptp(forces.positions[:, 0]) > 0:  # a cylinder has none
+            segments["Hoop moment [kN m/m]"] = forces.hoop_moment
+    return curves | {label: (1e-3 * np.repeat(values, 2), ends) for label, values in segments.items()}
 
 
 def save_axial_forces(path: Path, names: list[str], stages: list[StageForces]) -> None:

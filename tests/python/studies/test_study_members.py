@@ -3,6 +3,7 @@
 import csv
 import importlib
 import json
+import math
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -191,3 +192,23 @@ def test_studies_of_drawdown_and_rain_say_that_they_leave_members_out(tmp_path):
     read = importlib.import_module("common.slope_site").read_slope_site
     with pytest.warns(RuntimeWarning, match="the structural members 'wall' are left out here"):
         read(tmp_path / "dike.toml", MPI.COMM_WORLD, 3.0)
+
+
+def test_the_lining_of_a_shaft_has_hoop_forces(tmp_path):
+    """An axisymmetric pit between a stiff cylinder, which the ground presses with about K0 times its weight: N = p r."""
+    start, end = SITE.index('[members."upper strut"]'), SITE.index("[[stages]]")
+    stages = SITE[end:]
+    for strut in ("upper strut", "lower strut"):
+        stages = stages.replace(f'[[stages]]\nname = "{strut}"\ninstall = ["{strut}"]\n\n', "")
+    text = (SITE[:start] + stages).replace("cell_size = 1.0", "axisymmetric = true\ncell_size = 2.0")
+    excavation = importlib.import_module("excavation")
+    assert excavation.main(["--site", str(site_in(tmp_path, text)), "--output", str(tmp_path / "out")]) == 0
+    with open(tmp_path / "out" / "members.csv", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["name"] == "cut to 6 m"]
+    middle = next(row for row in rows if float(row["y_m"]) == pytest.approx(16.0, abs=0.3))
+    weight, radius = 19e3 * 4.0, 5.0
+    active, at_rest = math.tan(math.radians(45 - 33 / 2)) ** 2, 1 - math.sin(math.radians(33))
+    assert -1.2 * at_rest * weight * radius < float(middle["hoop_force_N_per_m"]) < -0.5 * active * weight * radius
+    assert all(abs(float(row["hoop_moment_N_m_per_m"])) < 1.0 for row in rows)
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["stages"][-1]["wall_hoop_force_N_per_m"] < float(middle["hoop_force_N_per_m"])
