@@ -236,6 +236,7 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
         for name, given in table.get("laws", {}).items()
     }
     members = {name: member_of(given, f"{path}: members.{name}") for name, given in table.get("members", {}).items()}
+    _require_columns(members, path)
     rows = table.get("stages", [])
     site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, supports_of(table, path, domain, facet_tags), [],
                 list(others.values()), axisymmetric, rows, members)  # fmt: skip
@@ -256,6 +257,17 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
             f"{path}: no stage fills the cells of {names}, which therefore hold no soil; name it in fill of a stage where it is there"
         )
     return site
+
+
+def _require_columns(members: Collection[str], path: Path) -> None:
+    """Require that no two members have the same columns in tables, where spaces become underscores."""
+    first: dict[str, str] = {}
+    for name in members:
+        other = first.setdefault(name.replace(" ", "_"), name)
+        if other != name:
+            raise mpm.InputError(
+                f"{path}: members: {other!r} and {name!r} would have the same columns in tables, expected other names"
+            )
 
 
 def site_mesh(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None) -> tuple[Any, Any, Any]:

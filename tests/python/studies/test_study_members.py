@@ -75,6 +75,7 @@ def test_struts_carry_the_earth_pressure_that_the_ground_below_does_not(braced):
         ("bending_stiffness = 79e6", "bending_stifness = 79e6", "members.wall: .*bending_stifness.*bending_stiffness"),
         ("fixed_end = true", "spacing = 1.0", "upper strut: .*'spacing', expected some of kind, points, axial_stiffness"),
         ("axial_stiffness = 2.9e9", "", "members.wall: .*axial_stiffness"),
+        ('[members."lower strut"]', "[members.upper_strut]", "'upper strut' and 'upper_strut' would have the same columns"),
         ("axial_stiffness = 2.9e9", "axial_stiffness = -1.0", "members.wall: axial_stiffness is -1.0 N/m"),
         ("points = [[5.0, 20.0], [5.0, 9.0]]", "", "members.wall has no points"),
         ("points = [[5.0, 19.0], [0.0, 19.0]]", "points = [[5.0, 19.0]]", "upper strut: points is .*, expected the two ends"),
