@@ -107,7 +107,8 @@ def water_forces(space: Any, water: PrescribedWater, there: fem.Function, radius
 
     By Gauss' theorem: the integral of p div v over the active cells, less that of p n v over their surface. Suction does not pull
     at the surface, so that its part of the second integral is taken out again. At a wall it is the pressures on both sides that act,
-    that of the pores from within the soil: on the side without soil, water stands only where the pressure there says so.
+    that of the pores from within the soil: on the side without soil, water stands only where the pressure there says so. Where walls
+    are, the pressure may also jump between soils of which one holds no water; the other pushes against it.
     """
     domain, p = space.mesh, water.pressure
     test, normal, suction = ufl.TestFunction(space), ufl.FacetNormal(domain), ufl.min_value(p, 0.0)
@@ -117,9 +118,12 @@ def water_forces(space: Any, water: PrescribedWater, there: fem.Function, radius
     form += weighted(ufl.inner(surface, test("+")), radius) * ufl.dS
     if water.walls is not None:
         ds, inside = (ufl.Measure(kind, domain=domain, subdomain_data=water.walls)(1) for kind in ("ds", "dS"))
-        beside = ufl.max_value(there("+"), there("-")) * _on_both_sides(p, normal)
+        both, either = there("+") * there("-"), ufl.max_value(there("+"), there("-"))
         form += weighted(there * (p - suction) * ufl.inner(normal, test), radius) * ds
-        form += weighted(ufl.inner(beside - surface, test("+")), radius) * inside
+        # Between cells that are there the pressure may also jump away from walls, below soil that holds no water.
+        form += weighted(ufl.inner(both * _on_both_sides(p - suction, normal), test("+")), radius) * ufl.dS
+        exposed = (1 - both) * (either * _on_both_sides(p, normal) - surface)
+        form += weighted(ufl.inner(exposed, test("+")), radius) * inside
     return assembled(fem.form(form), space).array.copy()
 
 

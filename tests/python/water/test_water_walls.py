@@ -189,6 +189,20 @@ def test_suction_beside_a_wall_acts_on_it():
     assert np.allclose(fem.member_forces("wall").displacement[:, 0], -2.0 * 5e3 / MODULUS, rtol=1e-8)
 
 
+@pytest.mark.parametrize("degree", [1, 2])
+def test_water_below_soil_without_water_lifts_it_beside_a_wall(degree):
+    """Water in the lower half of a column only: it swells by p h / M, the upper half is lifted, and its base carries no total stress."""
+    domain, _, facet_tags = bridge.box_mesh(COMM, (4.0, 2.0), (8, 4))
+    supports = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(BOTTOM)]
+    fem = bridge.QuasiStatic(domain, LAW, facet_tags, supports, degree)
+    wall = mpm.beam([(2.0, 2.0), (2.0, 1.0)], 1e-3, 1e-3, spacing=0.5, impervious=True)
+    fem.reconfigure(members={"wall": wall}, pore_pressure=lambda x: np.where(x[:, 1] < 1.0, 20e3, 0.0))
+    fem.solve(bridge.Load())
+    heave = fem.evaluate_at(np.array([[0.7, 1.0], [0.7, 2.0], [3.1, 2.0]]))["displacement"][:, 1]
+    assert np.allclose(heave, 20e3 * 1.0 / MODULUS, rtol=1e-8)
+    assert abs(fem.reaction(BOTTOM)[1]) < 1e-6 * 20e3
+
+
 def test_an_impervious_wall_beside_the_mesh_is_refused_where_there_is_water():
     fem, _ = halves()
     wall = {"wall": mpm.beam([(2.2, 0.0), (2.2, 1.0)], 1e6, 1e6, spacing=0.5, impervious=True)}
