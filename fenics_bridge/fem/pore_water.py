@@ -107,23 +107,23 @@ def water_forces(space: Any, water: PrescribedWater, there: fem.Function, radius
 
     By Gauss' theorem: the integral of p div v over the active cells, less that of p n v over their surface. Suction does not pull
     at the surface, so that its part of the second integral is taken out again. At a wall it is the pressures on both sides that act,
-    that of the pores from within the soil: on the side without soil, water stands only where the pressure there says so. Where walls
-    are, the pressure may also jump between soils of which one holds no water; the other pushes against it.
+    that of the pores from within the soil: on the side without soil, water stands only where the pressure there says so. A pressure
+    that jumps elsewhere in the soil, as below a wall, has its whole gradient at the border of two cells.
     """
     domain, p = space.mesh, water.pressure
     test, normal, suction = ufl.TestFunction(space), ufl.FacetNormal(domain), ufl.min_value(p, 0.0)
     surface = _on_both_sides(there * suction, normal)  # between two cells that are there it cancels
     form = -weighted(there * ufl.inner(ufl.grad(p), test), radius) * ufl.dx
     form += weighted(there * suction * ufl.inner(normal, test), radius) * ufl.ds
-    form += weighted(ufl.inner(surface, test("+")), radius) * ufl.dS
-    if water.walls is not None:
+    if water.walls is None:
+        form += weighted(ufl.inner(surface, test("+")), radius) * ufl.dS
+    else:
+        jump, both = _on_both_sides(p, normal), there("+") * there("-")
+        form += weighted(ufl.inner(both * jump + (1 - both) * surface, test("+")), radius) * ufl.dS
         ds, inside = (ufl.Measure(kind, domain=domain, subdomain_data=water.walls)(1) for kind in ("ds", "dS"))
-        both, either = there("+") * there("-"), ufl.max_value(there("+"), there("-"))
+        beside = (1 - both) * (ufl.max_value(there("+"), there("-")) * jump - surface)
         form += weighted(there * (p - suction) * ufl.inner(normal, test), radius) * ds
-        # Between cells that are there the pressure may also jump away from walls, below soil that holds no water.
-        form += weighted(ufl.inner(both * _on_both_sides(p - suction, normal), test("+")), radius) * ufl.dS
-        exposed = (1 - both) * (either * _on_both_sides(p, normal) - surface)
-        form += weighted(ufl.inner(exposed, test("+")), radius) * inside
+        form += weighted(ufl.inner(beside, test("+")), radius) * inside
     return assembled(fem.form(form), space).array.copy()
 
 

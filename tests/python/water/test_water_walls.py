@@ -149,6 +149,18 @@ def test_a_wall_moves_by_the_difference_of_the_pressures_beside_it(degree):
     assert fem.reaction(RIGHT)[0] == pytest.approx(8e3 + 6e3, rel=1e-8)
 
 
+@pytest.mark.parametrize("degree", [1, 2])
+def test_pressures_that_jump_below_a_wall_too_push_the_soil_there(degree):
+    """The wall ends in the soil, and the blocks below are as far out of balance as those beside it: u = L (p_left - p_right) / 2 M."""
+    fem, _ = halves(degree)
+    wall = mpm.beam([(2.0, 1.0), (2.0, 0.5)], 1e-3, 1e-3, spacing=0.5, impervious=True)
+    fem.reconfigure(members={"wall": wall}, pore_pressure=stepped(20e3, 8e3))
+    fem.solve(bridge.Load())
+    moved = fem.evaluate_at(np.array([[2.0, 0.0], [2.0, 0.5], [2.0, 1.0]]))["displacement"][:, 0]
+    assert np.allclose(moved, 2.0 * 12e3 / (2 * MODULUS), rtol=1e-8)
+    assert fem.reaction(LEFT)[0] == pytest.approx(-fem.reaction(RIGHT)[0], rel=1e-8)
+
+
 @pytest.mark.parametrize("beside", [0.0, 8e3])
 def test_the_exposed_face_of_a_wall_has_the_water_of_the_pit(beside):
     """u = L (p - p_pit) / M."""
