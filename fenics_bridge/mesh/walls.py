@@ -33,7 +33,7 @@ def lines_of(comm: MPI.Comm, walls: Iterable[Any]) -> list[NDArray[np.float64]]:
     """The lines (k, 2) [m] of walls, which are given as lines or as structural members. Collective.
 
     Raises:
-        InputError: no list, or a line that is none of finite points. Raised on all ranks alike.
+        InputError: no list, or a line that is none of finite points, each other than the one before. Raised on all ranks alike.
     """
     alone = hasattr(walls, "points") or not isinstance(walls, Iterable)
     agree(comm, f"walls is {walls!r}, expected a list of lines or of members" if alone else None)
@@ -45,6 +45,8 @@ def lines_of(comm: MPI.Comm, walls: Iterable[Any]) -> list[NDArray[np.float64]]:
             comm,
             None if good else f"walls has {line.tolist()}, expected two or more finite points (x, y) [m] of each line",
         )
+        twice = bool(np.any(np.all(np.diff(line, axis=0) == 0, axis=1)))
+        agree(comm, f"walls has {line.tolist()}, expected points that differ from the one before" if twice else None)
         lines.append(line)
     return lines
 

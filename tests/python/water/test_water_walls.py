@@ -100,6 +100,7 @@ def test_a_wall_from_side_to_side_parts_the_water():
         ([[(1.0, 0.0)]], "expected two or more finite points"),
         ([[(1.0, 0.0), (1.0, np.nan)]], "expected two or more finite points"),
         ([[(1.0, 0.0, 0.0), (1.0, 1.0, 0.0)]], "expected two or more finite points"),
+        ([[(1.0, 0.0), (1.0, 0.0), (1.0, 2.0)]], "expected points that differ from the one before"),
         (mpm.beam([(1.0, 0.0), (1.0, 2.0)], 1e9, 1e6), "expected a list of lines"),
         (3.0, "expected a list of lines"),
     ],
