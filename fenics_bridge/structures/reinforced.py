@@ -89,5 +89,12 @@ def _no_shell(name: str, member: Member) -> str | None:
     if not member.bending_stiffness or member.bond_strength < math.inf:
         kind = "a beam with a bond_strength" if member.bending_stiffness else "no beam"
         return f"{name!r} is {kind} in an axisymmetric body, expected beams without it: shells of revolution"
-    least = min(x for x, _ in member.points)
-    return f"{name!r} reaches to x = {least:g} m in an axisymmetric body, expected 0 or more" if least < 0 else None
+    radii = [x for x, _ in member.points]
+    if min(radii) < 0:
+        return f"{name!r} reaches to x = {min(radii):g} m in an axisymmetric body, expected 0 or more"
+    along = any(one == other == 0 for one, other in zip(radii, radii[1:]))
+    return (
+        f"{name!r} runs along the axis of an axisymmetric body, where a shell has no radius, expected x > 0 there"
+        if along
+        else None
+    )

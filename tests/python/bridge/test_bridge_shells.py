@@ -102,6 +102,7 @@ def test_other_members_are_refused_in_axial_symmetry():
         (mpm.strut(*line, 1e6), "'one' is no beam in an axisymmetric body"),
         (mpm.beam(line, 1e9, 1e6, bond_strength=1e3), "'one' is a beam with a bond_strength"),
         (mpm.beam([(-0.5, 0.1), (0.5, 0.1)], 1e9, 1e6), "'one' reaches to x = -0.5 m in an axisymmetric body"),
+        (mpm.beam([(0.5, 0.5), (0.0, 0.5), (0.0, 0.1)], 1e9, 1e6), "'one' runs along the axis of an axisymmetric body"),
     ):
         with pytest.raises(mpm.InputError, match=f"members: {message}"):
             fem.reconfigure(members={"one": member})
