@@ -43,7 +43,7 @@ def reconfigure(
     new = np.repeat((there.x.array > 0)[points.cells] & ~was_there[points.cells], points.per_cell)
     pressures, given = _pressures(model, pore_pressure), given_stress(model, stress, new)
     prepared = model._prepared_members(model.members if members is None else members, there if len(off) else None)
-    _warn_of_walls(domain.comm, prepared)
+    warn_of_walls(domain.comm, prepared, model.members)
     points.assign(np.where(there.x.array[: owned_cells(domain)] > 0, model._materials.number, -1), len(laws))
     take_over(model, new, laws, before, given)
     model._laws, model.off = laws, off
@@ -58,9 +58,15 @@ def reconfigure(
     _hold(model, duration, _risen(model, was_there))
 
 
-def _warn_of_walls(comm: Any, members: Any) -> None:
-    """Warn of members that hold water back, which they do not here."""
-    names = [repr(name) for name, one in members.items() if one.member.impervious and one.origin is None]
+def warn_of_walls(comm: Any, members: Any, before: dict[str, Member]) -> None:
+    """Warn of members that hold water back, which they do not here.
+
+    Args:
+        comm: the ranks.
+        members: those that are there from now on, prepared for `Members.change`.
+        before: those that were there, by name.
+    """
+    names = [repr(name) for name, one in members.items() if one.member.impervious and before.get(name) != one.member]
     if names and comm.rank == 0:
         warnings.warn(
             f"water flows through {', '.join(names)} in water.Consolidation, also where a beam is impervious: it holds back water in "

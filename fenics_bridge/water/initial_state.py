@@ -11,6 +11,7 @@ from fenics_bridge.errors import agree
 from fenics_bridge.fem.pore_water import pressures_at
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.fem.quasi_static import QuasiStatic
+from fenics_bridge.water.construction import warn_of_walls
 from fenics_bridge.water.seepage import Seepage
 
 
@@ -41,6 +42,7 @@ def set_initial_state(model: Any, stress: Any, pore_pressure: Any) -> None:
     if members is None:
         model._members.reset()
     else:
+        warn_of_walls(comm, members, model.members)
         model._members.change(members, model._own_unknowns())
         model._renew_solver()
     model._read_pressure()

@@ -1,5 +1,7 @@
 """Structural members in ground that consolidates: drained and undrained limits, prestress, take-over, inertia, wrong input."""
 
+import warnings
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -346,6 +348,17 @@ def test_water_that_flows_through_an_impervious_wall_is_said():
     model = ground()
     with pytest.warns(RuntimeWarning, match="water flows through 'wall' in water.Consolidation"):
         model.reconfigure(members={"wall": mpm.beam([(2.0, 2.0), (2.0, 0.5)], 1e9, 2e7, impervious=True)})
+
+
+def test_an_impervious_wall_that_is_taken_over_is_said_once():
+    model, wall = ground(), mpm.beam([(2.0, 2.0), (2.0, 0.5)], 1e9, 2e7, impervious=True)
+    fem = drained(model, {"wall": wall})
+    with pytest.warns(RuntimeWarning, match="water flows through 'wall' in water.Consolidation"):
+        model.initialise(fem, hydrostatic)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", message="water flows through")
+        model.reconfigure(members=model.members)
+        model.initialise(fem, hydrostatic)
 
 
 def test_a_new_beginning_leaves_members_with_their_prestress_alone():
