@@ -14,7 +14,7 @@ from . import _core
 from ._core import InputError
 from .collective import collectively
 from .mesh import cell_sizes
-from .member_warnings import odd_units, rigid_beam, rigid_fraction
+from .member_warnings import leaking, odd_units, rigid_beam, rigid_fraction
 from .members import Member, MemberForces, of_members, samples_of
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class MemberMethods:
             _core.install_member(model._core, *of_core)
             self._members[name] = {"member": _entry(member), "positions": positions.tolist()}
             rigid = rigid_beam(name, rigid_fraction(model, positions), "cells") if bends else ""
-            for text in filter(None, (rigid, *odd_units(name, member))):
+            for text in filter(None, (rigid, leaking(name, member, model), *odd_units(name, member))):
                 if model.comm.rank == 0:
                     warnings.warn(text, RuntimeWarning, stacklevel=2)
 

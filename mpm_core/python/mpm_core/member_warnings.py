@@ -28,6 +28,16 @@ MOST_RIGID = 0.1
 """Fraction of the nodes of a beam, at most, at which it may be unable to bend [-]: it is as much stiffer than it should be"""
 
 
+def leaking(name: str, member: Member, model: Model) -> str:
+    """What a warning says of a wall that holds water back, which it does not in the pore water of particles; empty for others."""
+    if not member.impervious or model._core.water is None:
+        return ""
+    return (
+        f"water flows through the beam {name!r}, which is impervious: members of particles do not hold their pore water back. Particles "
+        "with Undrained laws, whose water does not flow, keep the pressures of finite elements on both sides"
+    )
+
+
 def odd_units(name: str, member: Member) -> list[str]:
     """What warnings say of stiffness and strength that are probably not in N; empty for others."""
     stiffness, bending = member.axial_stiffness, member.bending_stiffness

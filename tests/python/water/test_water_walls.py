@@ -1,5 +1,7 @@
 """Walls that hold water back: flow around a sheet pile against its closed form, and the force of the water on walls."""
 
+import warnings
+
 import numpy as np
 import pytest
 from dolfinx.mesh import compute_midpoints, meshtags
@@ -237,3 +239,32 @@ def test_soil_that_would_come_apart_is_refused():
         ):
             with pytest.raises(mpm.InputError, match="domain is parted along walls, where its soil would come apart"):
                 use()
+
+
+@pytest.mark.parametrize("undrained", [True, False])
+def test_particles_take_both_sides_of_a_wall_over_and_say_where_water_flows_through(undrained):
+    mesh = bridge.box_mesh(COMM, (4.0, 3.0), (16, 12), body=((0.0, 0.0), (4.0, 2.0)))
+    body, cells, facets = bridge.soil_mesh(*mesh, tag=bridge.BODY)
+    supports = [bridge.roller(LEFT, (1, 0)), bridge.roller(RIGHT, (1, 0)), bridge.fixed(BOTTOM)]
+    fem = bridge.QuasiStatic(body, LAW, facets, supports, 1, cell_tags=cells)
+    wall = mpm.beam([(2.0, 2.0), (2.0, 1.0)], 1e8, 1e6, impervious=True)
+    # From the end of the wall on, at y = 1 m, the pressure on its right falls by half as much again as that on its left.
+    slope = lambda x: np.where((x[:, 0] < 2.0) | (x[:, 1] < 1.0), 1.0, 1.5)
+    fem.reconfigure(
+        members={"wall": wall}, pore_pressure=lambda x: GAMMA * np.maximum(0.75 - slope(x) * (x[:, 1] - 1), 0.0)
+    )
+    fem.solve(bridge.Load(unit_weight=20e3))
+    assert np.abs(fem.member_forces("wall").moment).max() > 10.0
+    model = mpm.Model(bridge.background_mesh(*mesh), mpm.Undrained(LAW, porosity=0.4) if undrained else LAW)
+    model.seed(density=20e3 / 9.81, per_cell=4, cell_tag=bridge.BODY)
+    model.roller(LEFT, (1, 0))
+    model.roller(RIGHT, (1, 0))
+    model.fix(BOTTOM)
+    model.set_gravity((0.0, -9.81))
+    if not undrained:
+        model.add_water(porosity=0.4, conductivity=1e-5)
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        report = bridge.initialise(model, fem, equilibrate=False)
+    assert ("water flows through the beam 'wall'" in " ".join(str(one.message) for one in found)) is not undrained
+    assert report.unbalanced_ratio < 1e-3
