@@ -69,7 +69,8 @@ def prescribed_water(
     Args:
         domain: mesh of the body.
         pore_pressure: function of positions (n, D) [m] that returns pressures (n,) [Pa]. Beside a wall it is asked for the pressures
-            on both sides of it, also where there is no soil: water that stands there presses on the wall.
+            on both sides of it, also where there is no soil: water that stands there presses on the wall. Outside of the mesh a wall
+            is dry.
         members: the structural members that are there, by name.
         there: function that is 1 in cells that are there and 0 in others.
 
