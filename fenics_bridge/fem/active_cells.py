@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from dolfinx import fem, la
 from dolfinx.mesh import Mesh
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenics_bridge import compat

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from mpm_core.members import Member, MemberForces, MemberStrains
+from mpm_core.member_strains import MemberStrains
+from mpm_core.members import Member, MemberForces
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse

@@ -44,6 +44,7 @@ from .checks import say
 from .site_doubts import warn_of_depth
 from .site_keys import changes_of, member_of, part_of, read_site_table, require_push
 from .site_laws import is_number, law_at, law_keys, located, unit_doubt, unit_weight_of
+from .site_supports import support_of, supports_of
 from .slope_case import GRAVITY
 from .stage_flow import with_steady_flow
 
@@ -53,7 +54,6 @@ CHANGES = ("excavate", "law", "unit_weight", "pressure", "support", "release", "
 """What a stage may change beside soils that it places"""
 STAGE_WATER = ("water_level", "steady_flow")
 """Keys of a stage that give it pore pressures"""
-DEFAULT_SUPPORTS = {"base": "fixed", **dict.fromkeys(("left", "right", "sides", "axis", "far"), "roller")}
 
 
 @dataclass
@@ -312,30 +312,6 @@ def cell_size_of(path: Path) -> float | None:
     return read_site_table(path).get("cell_size")
 
 
-def supports_of(table: dict, path: Path, domain: Any, facet_tags: Any) -> list[bridge.Support]:
-    """The supports that a site names; by default those of boundaries with the names of `DEFAULT_SUPPORTS`. Collective."""
-    names = bridge.names_of(facet_tags)
-    given = table.get("supports") or {name: kind for name, kind in DEFAULT_SUPPORTS.items() if name in names}
-    if not given:
-        raise mpm.InputError(
-            f"{path} has no [supports], and the mesh has no boundary named {', '.join(DEFAULT_SUPPORTS)}; it has {list(names)}"
-        )
-    return [_support(name, kind, f"{path}: supports.{name}", domain, facet_tags) for name, kind in given.items()]
-
-
-def _support(name: str, kind: str, where: str, domain: Any, facet_tags: Any) -> bridge.Support:
-    if kind == "fixed":
-        return bridge.fixed(name)
-    if kind != "roller":
-        raise mpm.InputError(f"{where} is {kind!r}, expected 'fixed' or 'roller'")
-    normal = bridge.flat_normal(domain, facet_tags, name)
-    if normal is None:
-        raise mpm.InputError(
-            f"{where}: a roller needs a boundary at right angles to an axis, expected 'fixed' for this one"
-        )
-    return bridge.roller(name, normal)
-
-
 def _stage(given: dict, number: int, site: Site, laws: dict[str, Any], path: Path) -> bridge.Stage:
     where = f"{path}: stages[{number}]"
     for key in ("law", "unit_weight", "pressure", "support"):
@@ -365,7 +341,7 @@ def _stage(given: dict, number: int, site: Site, laws: dict[str, Any], path: Pat
         law={soil: laws[law] for soil, law in given.get("law", {}).items()},
         unit_weight={**{soil: site.unit_weight[soil] for soil in fill}, **given.get("unit_weight", {})},
         pressure=given.get("pressure", {}),
-        support=[_support(name, kind, f"{where}.support.{name}", site.domain, site.facet_tags)
+        support=[support_of(name, kind, f"{where}.support.{name}", site.domain, site.facet_tags)
                  for name, kind in given.get("support", {}).items()],
         release=given.get("release", ()),
         pore_pressure=_water(given["water_level"], where, site.domain) if "water_level" in given else None,
