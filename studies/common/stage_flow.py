@@ -17,6 +17,7 @@ from fenics_bridge import water
 from fenics_bridge.water.soils import WATER_WEIGHT
 
 from .checks import say
+from .flow_doubts import warn_of_kept_flow, warn_of_low_reservoirs, warn_of_sealed_ground
 from .site_doubts import warn_of_reservoirs
 from .site_flow import boundaries_of_stage, boundary_of, wet_soils
 from .site_keys import DAY
@@ -88,11 +89,13 @@ def with_steady_flow(
     there: list[str] = []
     members: dict[str, mpm.Member] = {}
     result = list(stages[: len(stages) - len(rows)])
+    flowing = False
     for stage in result:
         there += stage.fill
     for k, (row, stage) in enumerate(zip(rows, stages[len(result) :])):
         where = f"{path}: stages[{k}]"
         there = [soil for soil in (*there, *stage.fill) if soil not in stage.excavate]
+        before = members
         members = {name: one for name, one in members.items() if name not in stage.remove} | stage.install
         boundary |= boundaries_of_stage(row, where)
         if _asks(row, where, table):
@@ -102,9 +105,15 @@ def with_steady_flow(
                 lacks = "no soil with a conductivity is there" if boundary else "the file has no [boundaries.NAME]"
                 raise mpm.InputError(f"{where}: steady_flow is true, but {lacks}")
             try:
-                stage = replace(stage, pore_pressure=_flow(mesh, soils, list(boundary.values()), walls, path))
+                pressure = _flow(mesh, soils, list(boundary.values()), walls, path, where)
+                stage, flowing = replace(stage, pore_pressure=pressure), True
+                warn_of_sealed_ground(pressure.flow, bridge.soil_mesh(*mesh, tag=there)[0], walls, where)
             except (mpm.InputError, RuntimeError) as error:
                 raise mpm.InputError(f"{where}: steady_flow: {error}") from None
+        elif "water_level" in row:
+            flowing = False
+        elif flowing:
+            warn_of_kept_flow(where, row, stage, before, [soil for soil in pores if pores[soil] is not None])
         result.append(stage)
     return result
 
@@ -121,7 +130,12 @@ def _asks(row: Mapping[str, Any], where: str, table: Mapping[str, Any]) -> bool:
 
 
 def _flow(
-    mesh: tuple[Any, Any, Any], soils: dict[str, water.PorousSoil], boundary: list[Any], walls: list[Any], path: Path
+    mesh: tuple[Any, Any, Any],
+    soils: dict[str, water.PorousSoil],
+    boundary: list[Any],
+    walls: list[Any],
+    path: Path,
+    where: str,
 ) -> StageFlow:
     """Steady flow through soils by name, by quadratic elements where no soil dries, and its pore pressures. Collective."""
     body, cells, facets = bridge.soil_mesh(*mesh, tag=list(soils), walls=walls)
@@ -130,6 +144,7 @@ def _flow(
     if not acting:
         raise mpm.InputError("no boundary with a condition is at the surface of the soils that are there")
     warn_of_reservoirs(body, acting, path)
+    warn_of_low_reservoirs(body, facets, acting, where)
     dries = any(not isinstance(soil.retention, water.AlwaysSaturated) for soil in soils.values())
     flow = water.Seepage(body, soils, facets, acting, cell_tags=cells, degree=1 if dries else 2)
     flow.solve()

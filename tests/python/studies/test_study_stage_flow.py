@@ -1,6 +1,7 @@
 """Steady flow in the stages of a site: around walls, through the soils that are there, under the conditions at their surface."""
 
 import json
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 from mpi4py import MPI
 from study_main import main
 
+import fenics_bridge as bridge
 import mpm_core as mpm
+from common.flow_doubts import warn_of_sealed_ground
 from common.site_file import read_site
 from common.stage_flow import StageFlow
 
@@ -95,6 +98,56 @@ def test_mistakes_in_a_steady_flow_are_named(tmp_path, old, new, message):
     text = TEXT.replace("porosity = 0.4\n", "") if old.startswith("conductivity") else TEXT
     with pytest.raises(mpm.InputError, match=message):
         read_site(site_in(tmp_path, text.replace(old, new)), MPI.COMM_WORLD)
+
+
+LAST = 'excavate = "cut 2"\nsteady_flow = true'
+FLOOR = '[boundaries."floor 2"]\nseepage_face = true'
+OUT = '\n[[stages]]\nname = "out"\nremove = "wall"\n'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (LAST, 'excavate = "cut 2"', r"stages\[3\] \('cut to 6 m'\) digs 'cut 2', but keeps the pore pressures"),
+        (LAST, LAST + "\n" + OUT, r"stages\[4\] \('out'\) removes 'wall', but keeps the pore pressures"),
+        # Nothing flows, so that the head of 23 m is that below the floor at 18 m.
+        (FLOOR, "", r"stages\[3\]: .* the ground at x = .* m, y = 18 m, where the water has a pressure of 49(\.0|\.1)? kPa"),
+        (FLOOR, FLOOR.replace("seepage_face = true", "reservoir = 16.0"),
+         r"stages\[3\]: .*reservoir of 'floor 2' is at 16 m, below this boundary, which is at 18 m and above"),
+    ],
+)  # fmt: skip
+def test_what_is_probably_a_mistake_in_a_flow_is_said(tmp_path, old, new, message):
+    assert old in TEXT
+    with pytest.warns(RuntimeWarning, match=message) as said:
+        read_site(site_in(tmp_path, TEXT.replace(old, new)), MPI.COMM_WORLD)
+    assert len([one for one in said if issubclass(one.category, RuntimeWarning)]) == 1
+
+
+def test_an_aquifer_below_clay_and_a_pit_without_water_are_no_mistakes(tmp_path):
+    """Water under pressure below soil without a conductivity is no open ground, and dry soil may be dug without another flow."""
+    dry = TEXT.replace("conductivity = 1e-4\nporosity = 0.4\n", "")  # that of the cuts
+    assert dry.count("conductivity") == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        read_site(site_in(tmp_path, TEXT), MPI.COMM_WORLD)
+        covered = dry.replace(LAST, 'excavate = "cut 2"').replace(FLOOR, "")
+        read_site(site_in(tmp_path, covered.replace("head = 23.0", "head = 20.5")), MPI.COMM_WORLD)
+
+
+def test_ground_below_an_impervious_slab_is_not_open():
+    body, _, tags = bridge.box_mesh(MPI.COMM_WORLD, (4.0, 2.0), (4, 2))
+    tags = bridge.name_tags(tags, {"left": 1})
+    flow = bridge.water.Seepage(body, bridge.water.PorousSoil(1e-4), tags, [bridge.water.Head("left", 5.0)])
+    flow.solve()
+    slab = mpm.beam([(0.0, 2.0), (4.0, 2.0)], 1e9, 1e7, impervious=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        warn_of_sealed_ground(flow, body, [slab], "here")
+    half = mpm.beam([(0.0, 2.0), (2.0, 2.0)], 1e9, 1e7, impervious=True)
+    with pytest.warns(
+        RuntimeWarning, match=r"here: .* at x = [23]\.5 m, y = 2 m, where the water has a pressure of 29\.4 kPa"
+    ):
+        warn_of_sealed_ground(flow, body, [half], "here")
 
 
 def test_the_study_seepage_flows_around_walls(tmp_path):

@@ -1,0 +1,102 @@
+"""Warnings of what is probably a mistake in stages of steady flow: pressures that are kept, sealed ground, reservoirs below it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from dolfinx.mesh import exterior_facet_indices
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge import water
+
+from .checks import say
+from .site_doubts import ends_of_height, levels_of, upward_facets
+
+SEALED = 0.01
+"""Pressure head [m] at ground without a condition, over the height of the mesh, above which it is said"""
+
+
+def warn_of_kept_flow(
+    where: str, row: Mapping[str, Any], stage: bridge.Stage, before: Mapping[str, mpm.Member], wet: Collection[str]
+) -> None:
+    """Warn of a stage that changes what the water flows through or around, but keeps the pore pressures of the flow before it.
+
+    Args:
+        where: the stage stands in the file.
+        row, stage: of the file, and what it means.
+        before: members that are there before the stage, by name.
+        wet: soils with a conductivity.
+    """
+    changed = [
+        f"{verb} {soil!r}"
+        for verb, soils in (("digs", stage.excavate), ("places", stage.fill))
+        for soil in soils
+        if soil in wet
+    ]
+    changed += [f"removes {name!r}" for name in stage.remove if name in before and before[name].impervious]
+    changed += [f"changes the water at {name!r}" for name in row.get("boundaries", {})]
+    if changed:
+        say(f"{where} ({stage.name!r}) {', '.join(changed)}, but keeps the pore pressures of the steady flow before it, also where soil is gone, as "
+            "of water that stands there: give it steady_flow = true or a water_level")  # fmt: skip
+
+
+def warn_of_sealed_ground(flow: water.Seepage, ground: Any, walls: Iterable[mpm.Member], where: str) -> None:
+    """Warn of ground that water presses against from below, where no boundary has a condition. Collective.
+
+    Args:
+        flow: the flow, solved.
+        ground: mesh of all soils that are there, also of those that hold no water, without walls.
+        walls: members that hold the water back.
+        where: the stage stands in the file.
+    """
+    domain, comm = flow.domain, flow.domain.comm
+    taken = [flow.facet_tags.find(n) for one in flow.boundary for n in bridge.names_of(flow.facet_tags)[one.facet_tag]]
+    closed = _middles(domain, np.setdiff1d(exterior_facet_indices(domain.topology), np.concatenate(taken)))
+    open_air = np.concatenate(comm.allgather(_middles(ground, exterior_facet_indices(ground.topology))))
+    low, high = ends_of_height(domain)
+    close = 1e-6 * (high - low)
+    free = np.isin(np.round(closed / close) @ (1, 1j), np.round(open_air / close) @ (1, 1j))
+    closed = closed[free & ~_on_lines(closed, [np.array(wall.points) for wall in walls], close)]
+    pressure = flow.pore_pressure()(closed - (0.0, close))
+    found = [part for part in comm.allgather((pressure, closed)) if len(part[0])]
+    if not found:
+        return
+    pressure, closed = (np.concatenate(parts) for parts in zip(*found))
+    worst = int(np.argmax(pressure))
+    if pressure[worst] > SEALED * (high - low) * flow.unit_weight:
+        x, y = closed[worst]
+        say(f"{where}: steady_flow: no boundary has a condition at the ground at x = {x:.4g} m, y = {y:.4g} m, where the water has a pressure of "
+            f"{pressure[worst] / 1e3:.3g} kPa: no water leaves there, and as much presses on the ground as if water stood on it; give that boundary "
+            "seepage_face = true or a reservoir")  # fmt: skip
+
+
+def warn_of_low_reservoirs(domain: Any, facets: Any, boundary: Iterable[Any], where: str) -> None:
+    """Warn of reservoirs whose level is below their whole boundary. Collective; where: the stage stands in the file."""
+    for one in boundary:
+        if isinstance(one, water.Reservoir):
+            lowest = min(
+                (float(y.min()) for _, y in water.ground_lines(domain, facets, one.facet_tag)), default=-np.inf
+            )
+            level = max(levels_of(one))
+            if level < lowest:
+                say(f"{where}: steady_flow: the reservoir of {one.facet_tag!r} is at {level:g} m, below this boundary, which is at {lowest:g} m and "
+                    "above: it is a seepage face, from which the water table does not fall any farther")  # fmt: skip
+
+
+def _middles(domain: Any, facets: np.ndarray) -> np.ndarray:
+    """Middles (k, 2) [m] of those of some facets at the border that soil is below of."""
+    middles: np.ndarray = upward_facets(domain, facets).mean(axis=1)
+    return middles
+
+
+def _on_lines(points: np.ndarray, lines: Iterable[np.ndarray], close: float) -> np.ndarray:
+    """Which points (k, 2) are on one of some lines (n, 2), up to a distance [m]: (k,)."""
+    on = np.zeros(len(points), dtype=bool)
+    for start, end in ((a, b) for line in lines for a, b in zip(line, line[1:])):
+        along = (end - start) / np.linalg.norm(end - start)
+        at = np.clip((points - start) @ along, 0.0, np.linalg.norm(end - start))
+        on |= np.linalg.norm(points - start - at[:, None] * along, axis=1) <= close
+    return on
