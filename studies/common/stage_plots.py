@@ -67,8 +67,10 @@ def stage_picture(site: bridge.FemSite, name: str) -> StagePicture | None:
         return None
     material, strain, _ = (np.concatenate(arrays) for arrays in zip(*parts))
     box = moved.points.min(axis=0), moved.points.max(axis=0)
-    water = {"water": level_line(pressure, *box)} if pressure else {}
-    water = {"water": flow.table()} if flow is not None else water
+    if flow is not None:
+        water = {"water": flow.table()}  # the pressures of a flow are there for all ranks at once only
+    else:
+        water = {"water": level_line(pressure, *box)} if pressure else {}
     return StagePicture(name, moved, material >= 0, strain, members=lines, flow=flow, **water)
 
 

@@ -14,6 +14,7 @@ import mpm_core as mpm
 from common.flow_doubts import warn_of_sealed_ground
 from common.site_file import read_site
 from common.stage_flow import StageFlow
+from common.stage_plots import stage_picture
 
 MESHES = Path(__file__).parents[3] / "meshes"
 TEXT = (MESHES / "dewatered_excavation.toml").read_text().replace("cell_size = 1.0", "cell_size = 3.0")
@@ -65,6 +66,16 @@ def test_the_study_excavation_has_the_flow_of_each_stage(tmp_path):
     assert summary["finished_run"] and (out / "stages_flow.png").exists()
     assert last["inflow_right_m2_per_day"] == pytest.approx(-last["inflow_floor 2_m2_per_day"], rel=1e-8)
     assert first["largest_exit_gradient"] < 1e-9 and 0.2 < last["largest_exit_gradient"] < 0.6
+
+
+def test_the_picture_of_a_stage_asks_no_rank_alone_for_its_flow(tmp_path, monkeypatch):
+    """Only the first rank draws: pressures of a flow, which all ranks find together, would let it wait for the others for ever."""
+    site = read_site(site_in(tmp_path), MPI.COMM_WORLD)
+    staged = bridge.FemSite(site.finite_elements(1))
+    staged.carry_out(site.stages[0])
+    monkeypatch.setattr("common.stage_plots.level_line", lambda *_: pytest.fail("the flow is asked on one rank"))
+    picture = stage_picture(staged, "in situ")
+    assert picture.flow is not None and np.allclose(picture.water[:, :, 1], 23.0, atol=0.01)
 
 
 def test_a_floor_that_is_lifted_is_said(tmp_path):
