@@ -155,7 +155,8 @@ def _wall_facets(domain: Mesh, members: Mapping[str, Member], there: fem.Functio
         return None
     comm, dim, corners, lines = domain.comm, domain.topology.dim, _corners(domain), list(walls.values())
     active = there.x.array[compat.cell_dofs(there.function_space)[:, 0]] > 0
-    require_along(comm, corners[active], lines, [f"members: the impervious wall {name!r}" for name in walls])
+    named = {f"members: the impervious wall {name!r}": line for name, line in walls.items()}
+    require_along(comm, corners[active], named)
     domain.topology.create_connectivity(dim, dim - 1)
     facets = domain.topology.connectivity(dim, dim - 1).array.reshape(-1, dim + 1)
     along = np.unique(facets[edges_on(corners, lines)]).astype(np.int32)

@@ -36,7 +36,7 @@ def soil_mesh(
         cell_tags: tags of its cells.
         facet_tags: tags of its facets; None where none is tagged.
         tag: number or name of a soil, or a sequence of them, e.g. ["clay", "fill"].
-        walls: lines (k, 2) [m], or structural members along them, at which the soil on both sides is parted: the water of a
+        walls: lines (k, 2) [m], or structural members along them, in a list or by name, at which the soil on both sides is parted: the water of a
             `water.Seepage`, for which alone such a mesh is, does not flow through them. The mesh, of triangles, must follow them.
 
     Returns:
@@ -62,8 +62,8 @@ def soil_mesh(
             None if dim == 2 else "walls is given in three dimensions, expected none: they are for triangles",
         )
         corners = domain.geometry.x[nodes, :dim]
-        require_along(domain.comm, corners, lines, [f"walls: the line {k}" for k in range(len(lines))])
-        numbers, points = _parted(domain.comm, numbers, corners, lines, points)
+        require_along(domain.comm, corners, lines)
+        numbers, points = _parted(domain.comm, numbers, corners, list(lines.values()), points)
     arrays = MeshArrays(points, numbers, values[cells], *_facets_of(domain, cells, numbers, facet_tags))
     body, body_cells, body_facets = distributed_mesh(domain.comm, arrays, dim)
     setattr(body, PARTED, bool(lines) or getattr(domain, PARTED, False))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,16 +29,17 @@ class Parting(NamedTuple):
     """Numbers of the nodes of which those after the last one are copies, in order, on all ranks: (k,)"""
 
 
-def lines_of(comm: MPI.Comm, walls: Iterable[Any]) -> list[NDArray[np.float64]]:
-    """The lines (k, 2) [m] of walls, which are given as lines or as structural members. Collective.
+def lines_of(comm: MPI.Comm, walls: Iterable[Any]) -> dict[str, NDArray[np.float64]]:
+    """The lines (k, 2) [m] of walls by what messages call them; they are lines or structural members, perhaps by name. Collective.
 
     Raises:
         InputError: no list, or a line that is none of finite points, each other than the one before. Raised on all ranks alike.
     """
     alone = hasattr(walls, "points") or not isinstance(walls, Iterable)
     agree(comm, f"walls is {walls!r}, expected a list of lines or of members" if alone else None)
-    lines = []
-    for wall in walls:
+    given = walls.items() if isinstance(walls, Mapping) else ((f"the line {k}", wall) for k, wall in enumerate(walls))
+    lines = {}
+    for name, wall in given:
         line = real_numbers(comm, "walls", getattr(wall, "points", wall))
         good = line.ndim == 2 and len(line) > 1 and line.shape[1] == 2 and bool(np.isfinite(line).all())
         agree(
@@ -47,7 +48,7 @@ def lines_of(comm: MPI.Comm, walls: Iterable[Any]) -> list[NDArray[np.float64]]:
         )
         twice = bool(np.any(np.all(np.diff(line, axis=0) == 0, axis=1)))
         agree(comm, f"walls has {line.tolist()}, expected points that differ from the one before" if twice else None)
-        lines.append(line)
+        lines[f"walls: {name!r}" if isinstance(walls, Mapping) else f"walls: {name}"] = line
     return lines
 
 
@@ -65,21 +66,18 @@ def edges_on(corners: NDArray[np.float64], lines: Sequence[NDArray[np.float64]])
     return found
 
 
-def require_along(
-    comm: MPI.Comm, corners: NDArray[np.float64], lines: Sequence[NDArray[np.float64]], names: Sequence[str]
-) -> None:
+def require_along(comm: MPI.Comm, corners: NDArray[np.float64], lines: Mapping[str, NDArray[np.float64]]) -> None:
     """Require that the edges of a mesh follow lines, from one end to the other, as far as these are in its cells. Collective.
 
     Args:
         comm: the ranks.
         corners: corners of this rank's cells [m], (m, 3, 2).
-        lines: the lines.
-        names: what messages call each.
+        lines: the lines by what messages call them.
 
     Raises:
         InputError: a line goes through a cell, or ends between two nodes. Raised on all ranks alike.
     """
-    here = next((f"{name} {text}" for line, name in zip(lines, names) if (text := _beside(corners, line))), None)
+    here = next((f"{name} {text}" for name, line in lines.items() if (text := _beside(corners, line))), None)
     found = next(filter(None, comm.allgather(here)), None)
     agree(comm, found and f"{found}, expected a line of the mesh; in gmsh, fragment the ground with it")
 

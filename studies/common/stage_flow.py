@@ -40,7 +40,7 @@ class StageFlow:
 
 
 def flow_row(pressure: Any) -> dict[str, float]:
-    """Results of a stage of steady flow: what enters at each boundary, and the gradient where water leaves. Collective.
+    """Results of a stage of steady flow: what enters at each boundary, and the gradient with which water leaves upwards. Collective.
 
     Args:
         pressure: pore pressures of the stage; there are results where they are a StageFlow.
@@ -50,7 +50,7 @@ def flow_row(pressure: Any) -> dict[str, float]:
     flow = pressure.flow
     tags = list(dict.fromkeys(one.facet_tag for one in flow.boundary))
     inflows = {f"inflow_{tag}_m2_per_day": DAY * flow.inflow(tag) for tag in tags}
-    return {**inflows, "largest_exit_gradient": max(water.exit_gradient(flow, tag) for tag in tags)}
+    return {**inflows, "largest_exit_gradient": max(water.exit_gradient(flow, tag, upwards=True) for tag in tags)}
 
 
 def warn_of_heave(row: Mapping[str, Any], unit_weights: Sequence[float]) -> None:
@@ -100,14 +100,14 @@ def with_steady_flow(
         boundary |= boundaries_of_stage(row, where)
         if _asks(row, where, table):
             soils = {soil: pores[soil] for soil in there if pores[soil] is not None}
-            walls = [member for member in members.values() if member.impervious]
+            walls = {name: member for name, member in members.items() if member.impervious}
             if not boundary or not soils:
                 lacks = "no soil with a conductivity is there" if boundary else "the file has no [boundaries.NAME]"
                 raise mpm.InputError(f"{where}: steady_flow is true, but {lacks}")
             try:
                 pressure = _flow(mesh, soils, list(boundary.values()), walls, path, where)
                 stage, flowing = replace(stage, pore_pressure=pressure), True
-                warn_of_sealed_ground(pressure.flow, bridge.soil_mesh(*mesh, tag=there)[0], walls, where)
+                warn_of_sealed_ground(pressure.flow, bridge.soil_mesh(*mesh, tag=there)[0], walls.values(), where)
             except (mpm.InputError, RuntimeError) as error:
                 raise mpm.InputError(f"{where}: steady_flow: {error}") from None
         elif "water_level" in row:
@@ -133,7 +133,7 @@ def _flow(
     mesh: tuple[Any, Any, Any],
     soils: dict[str, water.PorousSoil],
     boundary: list[Any],
-    walls: list[Any],
+    walls: dict[str, Any],
     path: Path,
     where: str,
 ) -> StageFlow:
@@ -147,7 +147,16 @@ def _flow(
     warn_of_low_reservoirs(body, facets, acting, where)
     dries = any(not isinstance(soil.retention, water.AlwaysSaturated) for soil in soils.values())
     flow = water.Seepage(body, soils, facets, acting, cell_tags=cells, degree=1 if dries else 2)
-    flow.solve()
+    try:
+        flow.solve()
+    except mpm.InputError as error:
+        apart = [repr(one.facet_tag) for one in boundary if one not in acting]
+        hint = (
+            f"; {', '.join(apart)} is not at the surface of the soils that are there and have a conductivity"
+            if apart
+            else ""
+        )
+        raise mpm.InputError(f"{error}{hint}") from None
     reservoirs = [(one, *line) for one in acting if isinstance(one, water.Reservoir)
                   for line in water.ground_lines(body, facets, one.facet_tag)]  # fmt: skip
     outside = water.reservoir_pressure(body, facets, acting) if reservoirs else None

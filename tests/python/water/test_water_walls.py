@@ -64,6 +64,7 @@ def test_the_flow_below_a_sheet_pile_has_its_closed_form(tmp_path, pile):
     # At the pile it leaves with i = pi H / (4 K T k), from the same mapping; in a deep layer this is H / (pi s) (Harr 1962).
     exit_at_pile = np.pi / (4 * ellipk(parameter) * DEPTH * np.sqrt(parameter))
     assert water.exit_gradient(flow, "downstream") == pytest.approx(exit_at_pile, rel=0.03)
+    assert water.exit_gradient(flow, "downstream", upwards=True) == water.exit_gradient(flow, "downstream")
     assert water.exit_gradient(flow, "upstream") == 0.0
     # By symmetry the head below the pile is the mean of both, and those beside it are as far from it on both sides.
     heads = flow.pore_pressure()(np.array([[0.0, 1.0], [-1e-3, 9.0], [1e-3, 9.0]])) / GAMMA + (1.0, 9.0, 9.0) - DEPTH
@@ -92,6 +93,12 @@ def test_a_wall_from_side_to_side_parts_the_water():
     flow.solve()
     assert np.allclose(flow.pore_pressure()(np.array([[1.9, 1.0], [2.1, 1.0]])), GAMMA * np.array([5.0, 4.0]))
     assert abs(flow.inflow(LEFT)) < 1e-15
+    across = water.Seepage(mesh[0], SAND, mesh[2], [water.Head(LEFT, 6.0), water.Head(RIGHT, 5.0)])
+    across.solve()
+    assert (
+        water.exit_gradient(across, RIGHT) == pytest.approx(0.25)
+        and water.exit_gradient(across, RIGHT, upwards=True) == 0.0
+    )
 
 
 @pytest.mark.parametrize(
@@ -99,6 +106,7 @@ def test_a_wall_from_side_to_side_parts_the_water():
     [
         ([[(1.1, 0.0), (1.1, 2.0)]], r"walls: the line 0 goes through a cell at \(1.1, "),
         ([[(1.0, 0.0), (1.0, 1.7)]], r"walls: the line 0 has the point \(1, 1.7\) m between the nodes of the mesh"),
+        ({"pile": [(1.1, 0.0), (1.1, 2.0)]}, r"walls: 'pile' goes through a cell at \(1.1, "),
         ([[(1.0, 0.0)]], "expected two or more finite points"),
         ([[(1.0, 0.0), (1.0, np.nan)]], "expected two or more finite points"),
         ([[(1.0, 0.0, 0.0), (1.0, 1.0, 0.0)]], "expected two or more finite points"),
