@@ -28,6 +28,7 @@ from fenics_bridge.water.boundary import (
     mistake_in,
     value_at,
 )
+from fenics_bridge.water.pieces import pieces_of
 
 
 class _Held(NamedTuple):
@@ -66,6 +67,7 @@ class AppliedBoundary:
         """Elevation of the dofs of this rank [m], ghosts included, shape (m,)"""
         highest = space.mesh.comm.allgather(float(np.abs(self.height).max(initial=0.0)))
         self._rounding = 1e-12 * max(highest)  # by which the coordinates of nodes at a level may miss it
+        self._pieces: NDArray[np.integer] | None = None
         self.held: list[_Held] = []
         """The conditions where they hold"""
 
@@ -164,6 +166,7 @@ class AppliedBoundary:
         comm = self._space.mesh.comm
         self.set_time(time)
         fixed, _, upper = self.bounds(time)
+        self._require_known_pieces(fixed, upper)
         heads = comm.allgather((bool(fixed.any()), float((self.height + upper).min(initial=np.inf))))
         if any(known for known, _ in heads):
             return None
@@ -178,6 +181,32 @@ class AppliedBoundary:
         text = "boundary: the steady pressure is undetermined: no head is prescribed (by Head, or by a Reservoir whose level reaches "
         agree(comm, f"{text}its facets), {problem}" if problem else None)
         return lowest
+
+    def _require_known_pieces(self, fixed: NDArray[np.bool_], upper: NDArray[np.float64]) -> None:
+        """Require a head, or water that enters and may leave, in each piece into which walls part the soil. Collective."""
+        comm = self._space.mesh.comm
+        if self._pieces is None:
+            self._pieces = pieces_of(self._space)
+        count = 1 + max(comm.allgather(int(self._pieces.max(initial=0))))
+        if count == 1:
+            return
+        enters = np.zeros(len(fixed), dtype=bool)
+        for held in self.held:
+            if held.rate is not None:
+                enters[held.dofs] |= float(held.rate.value) > 0
+        ways = [np.bincount(self._pieces[there], minlength=count) > 0 for there in (fixed, enters, np.isfinite(upper))]
+        head, inflow, outflow = np.any(comm.allgather(ways), axis=0)
+        unknown = ~(head | (inflow & outflow))
+        inside = np.flatnonzero(self._pieces == np.argmax(unknown)) if unknown.any() else np.empty(0, dtype=int)
+        at = self._space.tabulate_dof_coordinates()[inside, : self._dim].mean(axis=0) if len(inside) else np.zeros(0)
+        agree(
+            comm,
+            f"boundary: the steady pressure is undetermined in the soil about ({', '.join(f'{x:.6g}' for x in at)}) m, which walls part "
+            "from all other soil, expected a head there (Head, or a Reservoir whose level reaches its facets), or water that enters "
+            "and may leave"
+            if len(inside)
+            else None,
+        )
 
     def inflow(self, facet_tag: int | str | None, reaction: NDArray[np.float64]) -> float:
         """Water that enters through the facets of a tag; a node where several conditions meet counts for the first of them.

@@ -102,6 +102,24 @@ def test_a_wall_from_side_to_side_parts_the_water():
 
 
 @pytest.mark.parametrize(
+    "condition", [None, water.SeepageFace(RIGHT), water.Reservoir(RIGHT, -1.0), water.Flux(RIGHT, 1e-6)]
+)
+@pytest.mark.parametrize("degree", [1, 2])
+def test_soil_that_walls_part_from_all_heads_is_refused(condition, degree):
+    """Nothing says what the pressure behind the wall is: the matrix is singular there."""
+    mesh = bridge.box_mesh(COMM, (4.0, 4.0), (8, 8))
+    body, _, facets = bridge.soil_mesh(*mesh, tag=bridge.BODY, walls=[[(2.0, 0.0), (2.0, 4.0)]])
+    boundary = [water.Head(LEFT, 6.0), *([condition] if condition else [])]
+    flow = water.Seepage(body, SAND, facets, boundary, degree=degree)
+    with pytest.raises(
+        mpm.InputError, match=r"the steady pressure is undetermined in the soil about \(3, 2\) m, which walls part"
+    ):
+        flow.solve()
+    flow.boundary = [*boundary, water.Head(BOTTOM, 5.0)]
+    flow.solve()
+
+
+@pytest.mark.parametrize(
     ("walls", "message"),
     [
         ([[(1.1, 0.0), (1.1, 2.0)]], r"walls: the line 0 goes through a cell at \(1.1, "),
