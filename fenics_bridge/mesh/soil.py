@@ -14,7 +14,7 @@ from fenics_bridge import compat
 from fenics_bridge.errors import PARTED, agree, require_mesh
 from fenics_bridge.mesh.names import name_tags, names_of, tag_numbers
 from fenics_bridge.mesh.tagged import MeshArrays, distributed_mesh, owned_cells, require_tags_of, tag_values
-from fenics_bridge.mesh.walls import lines_of, parted, require_along
+from fenics_bridge.mesh.walls import lines_of, parted, require_along, warn_of_absent
 from fenics_bridge.types import MeshTags
 from mpm_core.mesh import Tag
 
@@ -63,6 +63,7 @@ def soil_mesh(
         )
         corners = domain.geometry.x[nodes, :dim]
         require_along(domain.comm, corners, lines)
+        warn_of_absent(domain.comm, corners, lines)
         numbers, points = _parted(domain.comm, numbers, corners, list(lines.values()), points)
     arrays = MeshArrays(points, numbers, values[cells], *_facets_of(domain, cells, numbers, facet_tags))
     body, body_cells, body_facets = distributed_mesh(domain.comm, arrays, dim)

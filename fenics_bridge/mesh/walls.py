@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -80,6 +81,19 @@ def require_along(comm: MPI.Comm, corners: NDArray[np.float64], lines: Mapping[s
     here = next((f"{name} {text}" for name, line in lines.items() if (text := _beside(corners, line))), None)
     found = next(filter(None, comm.allgather(here)), None)
     agree(comm, found and f"{found}, expected a line of the mesh; in gmsh, fragment the ground with it")
+
+
+def warn_of_absent(comm: MPI.Comm, corners: NDArray[np.float64], lines: Mapping[str, NDArray[np.float64]]) -> None:
+    """Warn of walls that are nowhere in a mesh, whose cells have the corners (m, 3, 2) [m]. Collective."""
+    there = np.any(comm.allgather([bool(edges_on(corners, [line]).any()) for line in lines.values()]), axis=0)
+    absent = [name for name, found in zip(lines, there) if not found]
+    if absent and comm.rank == 0:
+        line = lines[absent[0]]
+        warnings.warn(
+            f"{absent[0]} from ({_written(line[0])}) to ({_written(line[-1])}) m is not in the soil, and holds no water back",
+            RuntimeWarning,
+            stacklevel=3,
+        )
 
 
 def parted(

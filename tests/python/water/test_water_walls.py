@@ -139,6 +139,12 @@ def test_walls_that_are_no_lines_of_the_mesh_are_refused(walls, message):
         bridge.soil_mesh(*mesh, tag=bridge.BODY, walls=walls)
 
 
+def test_a_wall_that_is_not_in_the_soil_is_said():
+    mesh = bridge.box_mesh(COMM, (4.0, 4.0), (8, 8))
+    with pytest.warns(RuntimeWarning, match=r"walls: the line 1 from \(20, 0\) to \(20, 2\) m is not in the soil"):
+        bridge.soil_mesh(*mesh, tag=bridge.BODY, walls=[[(2.0, 0.0), (2.0, 2.0)], [(20.0, 0.0), (20.0, 2.0)]])
+
+
 # --- the force of water on walls -------------------------------------------------------------------------------------
 
 LAW = mpm.LinearElastic(young=1e6, poisson=0.25)
