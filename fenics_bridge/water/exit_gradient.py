@@ -15,11 +15,7 @@ from fenics_bridge.mesh.tagged import owned_cells
 from fenics_bridge.water.seepage import Seepage
 
 
-UPWARD = 0.5
-"""Component of the normal along the last axis from which on a facet counts as ground that water leaves upwards"""
-
-
-def exit_gradient(flow: Seepage, facet_tag: int | str, upwards: bool = False) -> float:
+def exit_gradient(flow: Seepage, facet_tag: int | str, upward: bool = False) -> float:
     """Largest gradient of the total head with which water leaves through the facets of a tag [-]; 0 where it enters only. Collective.
 
     Soil without cohesion is lifted by water that leaves upwards with the critical gradient (gamma - gamma_w) / gamma_w, about 1
@@ -29,7 +25,7 @@ def exit_gradient(flow: Seepage, facet_tag: int | str, upwards: bool = False) ->
     Args:
         flow: the flow.
         facet_tag: number or name of the tag.
-        upwards: whether only facets count of which the ground is below, such as the floor of a pit.
+        upward: whether its upward component alone counts, which lifts the soil; at a steep face water leaves sideways.
 
     Raises:
         InputError: no facet has the tag. Raised on all ranks alike.
@@ -52,10 +48,9 @@ def exit_gradient(flow: Seepage, facet_tag: int | str, upwards: bool = False) ->
     at_facet = (
         np.arange(values.shape[1]) != opposite[:, None] if values.shape[1] > 1 else np.ones((len(cells), 1), bool)
     )
-    normals = _outward(domain, cells, opposite)
-    leaving = -np.einsum("ckd,cd->ck", values, normals)
-    at_facet &= (normals[:, -1:] >= UPWARD) | (not upwards)
-    return domain.comm.allreduce(float(leaving[at_facet].max(initial=0.0)), MPI.MAX)
+    leaving = -np.einsum("ckd,cd->ck", values, _outward(domain, cells, opposite))
+    rising = np.where(leaving > 0, -values[:, :, -1], 0.0)
+    return domain.comm.allreduce(float((rising if upward else leaving)[at_facet].max(initial=0.0)), MPI.MAX)
 
 
 def _outward(domain: Mesh, cells: NDArray[np.integer], opposite: NDArray[np.integer]) -> NDArray[np.float64]:

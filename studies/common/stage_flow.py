@@ -40,7 +40,7 @@ class StageFlow:
 
 
 def flow_row(pressure: Any) -> dict[str, float]:
-    """Results of a stage of steady flow: what enters at each boundary, and the gradient with which water leaves upwards. Collective.
+    """Results of a stage of steady flow: what enters at each boundary, and the gradients with which it leaves. Collective.
 
     Args:
         pressure: pore pressures of the stage; there are results where they are a StageFlow.
@@ -50,19 +50,21 @@ def flow_row(pressure: Any) -> dict[str, float]:
     flow = pressure.flow
     tags = list(dict.fromkeys(one.facet_tag for one in flow.boundary))
     inflows = {f"inflow_{tag}_m2_per_day": DAY * flow.inflow(tag) for tag in tags}
-    return {**inflows, "largest_exit_gradient": max(water.exit_gradient(flow, tag, upwards=True) for tag in tags)}
+    gradients = {name: max(water.exit_gradient(flow, tag, upward) for tag in tags)
+                 for name, upward in (("largest_exit_gradient", False), ("largest_upward_exit_gradient", True))}  # fmt: skip
+    return inflows | gradients
 
 
 def warn_of_heave(row: Mapping[str, Any], unit_weights: Sequence[float]) -> None:
-    """Warn where water leaves with a gradient that lifts soil without cohesion.
+    """Warn where water leaves upwards with a gradient that lifts soil without cohesion.
 
     Args:
         row: results of a stage, with those of `flow_row`.
         unit_weights: of the soils that are there [N/m3].
     """
-    gradient, critical = row.get("largest_exit_gradient", 0.0), min(unit_weights) / WATER_WEIGHT - 1
+    gradient, critical = row.get("largest_upward_exit_gradient", 0.0), min(unit_weights) / WATER_WEIGHT - 1
     if gradient > critical:
-        say(f"stage {row['stage']!r}: water leaves the ground with a gradient of {gradient:.2f}, above the critical one of "
+        say(f"stage {row['stage']!r}: water leaves the ground upwards with a gradient of {gradient:.2f}, above the critical one of "
             f"{critical:.2f} of soil of {min(unit_weights) / 1e3:.3g} kN/m3: it lifts soil without cohesion (hydraulic heave)")  # fmt: skip
 
 

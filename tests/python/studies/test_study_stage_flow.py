@@ -13,7 +13,7 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 from common.flow_doubts import warn_of_sealed_ground
 from common.site_file import read_site
-from common.stage_flow import StageFlow
+from common.stage_flow import StageFlow, warn_of_heave
 from common.stage_plots import stage_picture
 
 MESHES = Path(__file__).parents[3] / "meshes"
@@ -85,7 +85,7 @@ def test_a_floor_that_is_lifted_is_said(tmp_path):
     )
     short = short.replace("cohesion = 1e3", "cohesion = 30e3").replace("unit_weight = 20e3", "unit_weight = 16e3")
     with pytest.warns(
-        RuntimeWarning, match="stage 'cut to 6 m': water leaves the ground with a gradient of .*hydraulic heave"
+        RuntimeWarning, match="stage 'cut to 6 m': water leaves the ground upwards with a gradient of .*hydraulic heave"
     ):
         main("excavation", ["--site", str(site_in(tmp_path, short)), "--output", str(tmp_path / "out"), "--no-compare"])
 
@@ -174,3 +174,11 @@ def test_the_study_seepage_flows_around_walls(tmp_path):
         assert main("seepage", ["--site", str(site_in(tmp_path, text)), "--output", str(out)]) == 0
         inflows.append(json.loads((out / "summary.json").read_text())["steady_inflow_right_m2_per_day"])
     assert 0 < inflows[1] < 0.85 * inflows[0]
+
+
+@pytest.mark.parametrize(("sideways", "upward", "said"), [(1.5, 0.2, False), (1.5, 1.2, True)])
+def test_water_that_leaves_sideways_lifts_no_soil(sideways, upward, said, recwarn):
+    """The critical gradient of soil of 20 kN/m3 is 20 / 9.81 - 1 = 1.04."""
+    row = {"stage": "cut", "largest_exit_gradient": sideways, "largest_upward_exit_gradient": upward}
+    warn_of_heave(row, [20e3])
+    assert any("hydraulic heave" in str(one.message) for one in recwarn) == said

@@ -64,12 +64,27 @@ def test_the_flow_below_a_sheet_pile_has_its_closed_form(tmp_path, pile):
     # At the pile it leaves with i = pi H / (4 K T k), from the same mapping; in a deep layer this is H / (pi s) (Harr 1962).
     exit_at_pile = np.pi / (4 * ellipk(parameter) * DEPTH * np.sqrt(parameter))
     assert water.exit_gradient(flow, "downstream") == pytest.approx(exit_at_pile, rel=0.03)
-    assert water.exit_gradient(flow, "downstream", upwards=True) == water.exit_gradient(flow, "downstream")
+    assert water.exit_gradient(flow, "downstream", upward=True) == water.exit_gradient(flow, "downstream")
     assert water.exit_gradient(flow, "upstream") == 0.0
     # By symmetry the head below the pile is the mean of both, and those beside it are as far from it on both sides.
     heads = flow.pore_pressure()(np.array([[0.0, 1.0], [-1e-3, 9.0], [1e-3, 9.0]])) / GAMMA + (1.0, 9.0, 9.0) - DEPTH
     assert heads[0] == pytest.approx(0.5, abs=2e-3)
     assert heads[1] + heads[2] == pytest.approx(1.0, abs=2e-3) and heads[1] > heads[2] + 0.15
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_the_upward_part_of_the_gradient_is_that_which_lifts(degree):
+    """Water leaves a block sideways with i = 3 / 4, and another upwards with i = 1 / 2."""
+    domain, _, facets = bridge.box_mesh(COMM, (4.0, 4.0), (4, 4))
+    for heads, out, exact in (
+        ((LEFT, 9.0, RIGHT, 6.0), RIGHT, (0.75, 0.0)),
+        ((BOTTOM, 6.0, TOP, 4.0), TOP, (0.5, 0.5)),
+    ):
+        boundary = [water.Head(*heads[:2]), water.Head(*heads[2:])]
+        flow = water.Seepage(domain, SAND, facets, boundary, degree=degree)
+        flow.solve()
+        found = [water.exit_gradient(flow, out, upward) for upward in (False, True)]
+        assert found == pytest.approx(exact, abs=1e-12)
 
 
 def test_a_wall_parts_its_nodes_and_keeps_tags(tmp_path):
@@ -97,7 +112,7 @@ def test_a_wall_from_side_to_side_parts_the_water():
     across.solve()
     assert (
         water.exit_gradient(across, RIGHT) == pytest.approx(0.25)
-        and water.exit_gradient(across, RIGHT, upwards=True) == 0.0
+        and water.exit_gradient(across, RIGHT, upward=True) == 0.0
     )
 
 
