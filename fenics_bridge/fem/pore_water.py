@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.mesh import Mesh, meshtags
+from dolfinx.mesh import Mesh, exterior_facet_indices, meshtags
 from mpi4py import MPI
 from mpm_core.members import Member
 from numpy.typing import NDArray
@@ -136,11 +136,22 @@ def water_on_supports(model: Any, facet_tag: int | str) -> NDArray[np.float64]:
         return force
     held = held_components(domain, model.facet_tags, model.supports)
     pressure, test = weighted(ufl.max_value(water.pressure, 0.0), model.radius), ufl.TestFunction(space)
+    wet = _without_dry_walls(model.facet_tags, water)
     for number in tag_numbers(domain.comm, model.facet_tags, facet_tag, "facet_tag"):
         if number in held:
-            form = pressing(domain, pressure, test, model.facet_tags, number, model._loads.active)
+            form = pressing(domain, pressure, test, wet, number, model._loads.active)
             force -= held[number] * assembled(fem.form(form), space).array.reshape(-1, dim)[:own].sum(axis=0)
     return domain.comm.allreduce(force)
+
+
+def _without_dry_walls(facet_tags: MeshTags, water: PrescribedWater) -> MeshTags:
+    """Tags of a boundary without its facets along walls, outside of which there is no water: the soil's own presses on these."""
+    if water.walls is None:
+        return facet_tags
+    domain = water.pressure.function_space.mesh
+    dry = np.intersect1d(water.walls.indices, exterior_facet_indices(domain.topology))
+    kept = ~np.isin(facet_tags.indices, dry)
+    return meshtags(domain, facet_tags.dim, facet_tags.indices[kept], facet_tags.values[kept])
 
 
 def _on_both_sides(value: Any, normal: Any) -> Any:

@@ -244,6 +244,17 @@ def test_the_outer_face_of_a_wall_at_the_boundary_is_dry():
     assert np.allclose(fem.member_forces("wall").displacement[:, 0], 2.0 * 20e3 / MODULUS, rtol=1e-8)
 
 
+@pytest.mark.parametrize("impervious", [False, True])
+def test_a_support_along_a_wall_carries_the_total_stress_once(impervious):
+    """Soil that is held all around and does not move leaves its water to the supports."""
+    fem, _ = halves()
+    wall = mpm.beam([(4.0, 0.0), (4.0, 1.0)], 1e-3, 1e-3, spacing=0.5, impervious=impervious)
+    fem.reconfigure(members={"wall": wall}, pore_pressure=lambda x: np.full(len(x), 20e3))
+    fem.solve(bridge.Load())
+    assert fem.reaction(LEFT)[0] == pytest.approx(-20e3, rel=1e-8)
+    assert fem.reaction(RIGHT)[0] == pytest.approx(20e3, rel=1e-8)
+
+
 def test_suction_beside_a_wall_acts_on_it():
     fem, members = halves()
     fem.reconfigure(off=[2], members=members, pore_pressure=stepped(-5e3, 0.0))
