@@ -6,6 +6,7 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from fenics_bridge import water
 
 pytestmark = [pytest.mark.filterwarnings("ignore:the beam 'shell' " + text) for text in ("ends at", "is as stiff as")]
 
@@ -107,3 +108,40 @@ def test_other_members_are_refused_in_axial_symmetry():
         with pytest.raises(mpm.InputError, match=f"members: {message}"):
             fem.reconfigure(members={"one": member})
     assert not fem.members
+
+
+def test_shells_in_ground_that_consolidates_carry_in_the_end_what_they_do_without_a_flow():
+    domain, _, facet_tags = bridge.box_mesh(COMM, (4.0, 2.0), (8, 4))
+    supports = [bridge.roller(AXIS, (1, 0)), bridge.roller(RIM, (1, 0)), bridge.fixed(BOTTOM)]
+    law, geometry, load = (
+        mpm.LinearElastic(young=10e6, poisson=0.3),
+        mpm.Geometry.AXISYMMETRIC,
+        bridge.Load(18e3, {TOP: 30e3}),
+    )
+    shells = {
+        "raft": mpm.beam([(0.0, 2.0), (2.0, 2.0)], 1e9, 5e6, clamped_start=True),
+        "pipe": mpm.beam([(2.0, 2.0), (2.0, 1.0)], 1e8, 5e5),
+    }
+    level = lambda x: 9810.0 * (2.0 - x[:, 1])
+    fem = bridge.QuasiStatic(domain, law, facet_tags, supports, geometry=geometry)
+    fem.reconfigure(pore_pressure=level)
+    fem.solve(bridge.Load(18e3))
+    model = water.Consolidation(
+        domain,
+        law,
+        water.PorousSoil(1e-6),
+        facet_tags,
+        supports,
+        [water.Reservoir(TOP, 2.0)],
+        load=load,
+        geometry=geometry,
+    )
+    model.initialise(fem, level)
+    for body in (model, fem):
+        body.reconfigure(members=shells)
+    assert all(model.advance(dt).converged for dt in (1e3, 1e5, 1e8))
+    fem.solve(load)
+    for name in shells:
+        for part in ("axial_force", "moment", "hoop_force", "hoop_moment"):
+            found, expected = (getattr(one.member_forces(name), part) for one in (model, fem))
+            assert np.allclose(found, expected, rtol=0, atol=1e-6 * np.abs(expected).max() + 1e-6), (name, part)
