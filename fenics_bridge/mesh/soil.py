@@ -55,7 +55,7 @@ def soil_mesh(
     cells = np.flatnonzero(np.isin(values, numbers))
     nodes = compat.cell_nodes(domain)[cells]
     number, points = _numbered_nodes(domain, nodes)
-    numbers, lines = number[nodes], lines_of(domain.comm, walls)
+    of_cells, lines = number[nodes], lines_of(domain.comm, walls)
     if lines:
         agree(
             domain.comm,
@@ -64,8 +64,8 @@ def soil_mesh(
         corners = domain.geometry.x[nodes, :dim]
         require_along(domain.comm, corners, lines)
         warn_of_absent(domain.comm, corners, lines)
-        numbers, points = _parted(domain.comm, numbers, corners, list(lines.values()), points)
-    arrays = MeshArrays(points, numbers, values[cells], *_facets_of(domain, cells, numbers, facet_tags))
+        of_cells, points = _parted(domain.comm, of_cells, corners, list(lines.values()), points)
+    arrays = MeshArrays(points, of_cells, values[cells], *_facets_of(domain, cells, of_cells, facet_tags))
     body, body_cells, body_facets = distributed_mesh(domain.comm, arrays, dim)
     setattr(body, PARTED, bool(lines) or getattr(domain, PARTED, False))
     for there, here in ((cell_tags, body_cells), (facet_tags, body_facets)):

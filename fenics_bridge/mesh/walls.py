@@ -131,8 +131,8 @@ def parted(
     of_group = np.zeros(group.max() + 1, dtype=np.int64)
     of_group[pairs[:, 1]] = numbers
     start = sum(len(part) for part in everywhere[:rank])
-    result, rows = cells.copy(), slice(start, start + len(beside))
-    result[beside] = np.where(at_wall[rows], of_group[group[rows]], cells[beside])
+    result, own = cells.copy(), slice(start, start + len(beside))
+    result[beside] = np.where(at_wall[own], of_group[group[own]], cells[beside])
     return Parting(result, pairs[further, 0])
 
 

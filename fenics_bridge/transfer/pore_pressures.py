@@ -79,7 +79,7 @@ def add_to_stress(
     Raises:
         InputError: particles of other laws are under pore pressures. Raised on all ranks alike, before anything changes.
     """
-    water = fem._water.pressure if smooth else fem.pore_pressure_function()
+    water = fem._water.pressure if smooth and fem._water is not None else fem.pore_pressure_function()
     pressure = search.values(water)[:, 0]
     agree(model.comm, _drained_mistake(model, pressure, 1e-6 * fem.largest_pore_pressure()))
     for number, law in enumerate(model.laws):

@@ -20,7 +20,7 @@ class MemberStrains:
     operator: NDArray[np.float64]
     """Strain [-] or curvature [1/m] by displacement component, shape (k, n, D)"""
     lengths: NDArray[np.float64]
-    """Length over which each strain acts [m], shape (k,)"""
+    """Length over which each strain acts [m], area of one radian of a shell [m2], shape (k,)"""
     segments: int
     """Number of segments, whose axial strains come first"""
     bends_at: tuple[tuple[int, ...], ...]

@@ -1,4 +1,4 @@
-"""Structural members: bars, struts and beams that are embedded in soil, in plane strain and, without bending, in three dimensions."""
+"""Structural members that are embedded in soil: bars and struts, and beams in plane strain and axial symmetry."""
 
 from __future__ import annotations
 
@@ -196,11 +196,12 @@ def beam(
     clamped_end: bool = False,
     impervious: bool = False,
 ) -> Member:
-    """A beam that bends with the soil: a sheet-pile or diaphragm wall, a row of piles, the lining of a tunnel. Plane strain only.
+    """A beam that bends with the soil: a sheet-pile or diaphragm wall, a row of piles, the lining of a tunnel.
 
-    Its ends are free of moments unless they are clamped. A line whose last point is its first is a ring, which bends there as
-    elsewhere. Shear strains are left out (Euler and Bernoulli). It slips along the soil where the force between both exceeds the
-    strength of their bond, but does not part from it.
+    It is for plane strain and, as a shell of revolution, for axisymmetric finite elements. Its ends are free of moments unless they
+    are clamped. A line whose last point is its first is a ring, which bends there as elsewhere. Shear strains are left out (Euler
+    and Bernoulli). It slips along the soil where the force between both exceeds the strength of their bond, but does not part from
+    it.
 
     Args:
         points: two or more points of its line [m], shape (k, 2).
@@ -236,9 +237,7 @@ def _made(points: Any, axial_stiffness: float, **values: Any) -> Member:
     if np.any(edges == 0):
         raise InputError(f"points is {points.tolist()}, expected points that differ from the one before")
     if "bending_stiffness" in values and points.shape[1] == 3:
-        raise InputError(
-            "points has three dimensions, expected two: beams are for plane strain, bars and struts for both"
-        )
+        raise InputError("points has three dimensions, expected two: beams are for plane strain and axial symmetry")
     for name in ("tensile_strength", "compressive_strength", "plastic_moment", "bond_strength"):
         values[name] = within(name, values.get(name, math.inf), 0.0, math.inf)
     for name in ("fixed_end", "connected", "clamped_start", "clamped_end", "impervious"):
