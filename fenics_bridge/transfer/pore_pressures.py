@@ -110,6 +110,8 @@ def stands_on_surface(fem: QuasiStatic) -> bool:
     at_node = np.zeros(len(domain.geometry.x))
     at_node[compat.cell_nodes(domain)] = water.x.array[compat.cell_dofs(water.function_space)]
     facets = exterior_facet_indices(domain.topology)
+    if fem._water.walls is not None:  # which are dry outside
+        facets = np.setdiff1d(facets, fem._water.walls.indices)
     for support in fem.supports:
         for number in tag_numbers(domain.comm, fem.facet_tags, support.facet_tag, "supports"):
             facets = np.setdiff1d(facets, fem.facet_tags.find(number))
