@@ -110,10 +110,8 @@ def test_a_wall_from_side_to_side_parts_the_water():
     assert abs(flow.inflow(LEFT)) < 1e-15
     across = water.Seepage(mesh[0], SAND, mesh[2], [water.Head(LEFT, 6.0), water.Head(RIGHT, 5.0)])
     across.solve()
-    assert (
-        water.exit_gradient(across, RIGHT) == pytest.approx(0.25)
-        and water.exit_gradient(across, RIGHT, upward=True) == 0.0
-    )
+    assert water.exit_gradient(across, RIGHT) == pytest.approx(0.25)
+    assert water.exit_gradient(across, RIGHT, upward=True) < 1e-12
 
 
 @pytest.mark.parametrize(
