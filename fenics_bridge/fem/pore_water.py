@@ -114,17 +114,18 @@ def water_forces(space: Any, water: PrescribedWater, there: fem.Function, radius
     domain, p = space.mesh, water.pressure
     test, normal, suction = ufl.TestFunction(space), ufl.FacetNormal(domain), ufl.min_value(p, 0.0)
     surface = _on_both_sides(there * suction, normal)  # between two cells that are there it cancels
+    # Since DOLFINx 0.8 all facets of a form must have the same tags, those of the walls.
+    ds, inside = (ufl.Measure(kind, domain=domain, subdomain_data=water.walls) for kind in ("ds", "dS"))
     form = -weighted(there * ufl.inner(ufl.grad(p), test), radius) * ufl.dx
-    form += weighted(there * suction * ufl.inner(normal, test), radius) * ufl.ds
+    form += weighted(there * suction * ufl.inner(normal, test), radius) * ds
     if water.walls is None:
-        form += weighted(ufl.inner(surface, test("+")), radius) * ufl.dS
+        form += weighted(ufl.inner(surface, test("+")), radius) * inside
     else:
         jump, both = _on_both_sides(p, normal), there("+") * there("-")
-        form += weighted(ufl.inner(both * jump + (1 - both) * surface, test("+")), radius) * ufl.dS
-        ds, inside = (ufl.Measure(kind, domain=domain, subdomain_data=water.walls)(1) for kind in ("ds", "dS"))
+        form += weighted(ufl.inner(both * jump + (1 - both) * surface, test("+")), radius) * inside
         beside = (1 - both) * (ufl.max_value(there("+"), there("-")) * jump - surface)
-        form += weighted(there * (p - suction) * ufl.inner(normal, test), radius) * ds
-        form += weighted(ufl.inner(beside, test("+")), radius) * inside
+        form += weighted(there * (p - suction) * ufl.inner(normal, test), radius) * ds(1)
+        form += weighted(ufl.inner(beside, test("+")), radius) * inside(1)
     return assembled(fem.form(form), space).array.copy()
 
 
