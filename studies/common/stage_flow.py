@@ -152,12 +152,8 @@ def _flow(
     try:
         flow.solve()
     except mpm.InputError as error:
-        apart = [repr(one.facet_tag) for one in boundary if one not in acting]
-        hint = (
-            f"; {', '.join(apart)} is not at the surface of the soils that are there and have a conductivity"
-            if apart
-            else ""
-        )
+        apart = ", ".join(repr(one.facet_tag) for one in boundary if one not in acting)
+        hint = f"; not at the surface of the soils that are there and have a conductivity: {apart}" if apart else ""
         raise mpm.InputError(f"{error}{hint}") from None
     reservoirs = [(one, *line) for one in acting if isinstance(one, water.Reservoir)
                   for line in water.ground_lines(body, facets, one.facet_tag)]  # fmt: skip

@@ -90,6 +90,15 @@ def test_a_floor_that_is_lifted_is_said(tmp_path):
         main("excavation", ["--site", str(site_in(tmp_path, short)), "--output", str(tmp_path / "out"), "--no-compare"])
 
 
+def test_a_head_beside_soil_without_water_is_named(tmp_path):
+    """Behind a wall of soil without conductivity no head reaches the cuts, whose floors let water out only."""
+    text = TEXT.replace("conductivity = 1e-4  # m/s\nporosity = 0.4\n", "", 1)
+    with pytest.raises(
+        mpm.InputError, match=r"steady_flow: .*not at the surface of the soils .* conductivity: 'right', "
+    ):
+        read_site(site_in(tmp_path, text), MPI.COMM_WORLD)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
