@@ -62,7 +62,7 @@ def edges_on(corners: NDArray[np.float64], lines: Sequence[NDArray[np.float64]])
             near = ON_LINE * np.linalg.norm(end - start, axis=1)
             on = np.ones(len(corners), dtype=bool)
             for part in (0.0, 0.5, 1.0):
-                on &= _distance(start + part * (end - start), line) <= near
+                on &= distance_from(start + part * (end - start), line) <= near
             found[:, k] |= on
     return found
 
@@ -188,7 +188,7 @@ def _barycentric(corners: NDArray[np.float64], point: NDArray[np.float64]) -> ND
     return np.concatenate([1 - inner.sum(axis=1, keepdims=True), inner], axis=1)
 
 
-def _distance(points: NDArray[np.float64], line: NDArray[np.float64]) -> NDArray[np.float64]:
+def distance_from(points: NDArray[np.float64], line: NDArray[np.float64]) -> NDArray[np.float64]:
     """Distance of points (n, 2) from a line (k, 2) [m]: (n,)."""
     nearest = np.full(len(points), np.inf)
     for start, end in zip(line, line[1:]):

@@ -11,6 +11,7 @@ from dolfinx.mesh import exterior_facet_indices
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import water
+from fenics_bridge.mesh.walls import distance_from
 
 from .checks import say
 from .site_doubts import ends_of_height, levels_of, upward_facets
@@ -59,7 +60,9 @@ def warn_of_sealed_ground(flow: water.Seepage, ground: Any, walls: Iterable[mpm.
     low, high = ends_of_height(domain)
     close = 1e-6 * (high - low)
     free = np.isin(np.round(closed / close) @ (1, 1j), np.round(open_air / close) @ (1, 1j))
-    closed = closed[free & ~_on_lines(closed, [np.array(wall.points) for wall in walls], close)]
+    for wall in walls:
+        free &= distance_from(closed, np.array(wall.points)) > close
+    closed = closed[free]
     pressure = flow.pore_pressure()(closed - (0.0, close))
     found = [part for part in comm.allgather((pressure, closed)) if len(part[0])]
     if not found:
@@ -90,13 +93,3 @@ def _middles(domain: Any, facets: np.ndarray) -> np.ndarray:
     """Middles (k, 2) [m] of those of some facets at the border that soil is below of."""
     middles: np.ndarray = upward_facets(domain, facets).mean(axis=1)
     return middles
-
-
-def _on_lines(points: np.ndarray, lines: Iterable[np.ndarray], close: float) -> np.ndarray:
-    """Which points (k, 2) are on one of some lines (n, 2), up to a distance [m]: (k,)."""
-    on = np.zeros(len(points), dtype=bool)
-    for start, end in ((a, b) for line in lines for a, b in zip(line, line[1:])):
-        along = (end - start) / np.linalg.norm(end - start)
-        at = np.clip((points - start) @ along, 0.0, np.linalg.norm(end - start))
-        on |= np.linalg.norm(points - start - at[:, None] * along, axis=1) <= close
-    return on
