@@ -22,6 +22,7 @@ from mpm_core.collective import on_first_rank
 from .files import IN_SOURCES, NOT_WRITTEN, ROOT, OutputError, written_whole
 from .options import Options
 from .parameters import write_parameters
+from .site_tables import site_files
 
 MARK = ".talus-run"
 """The file that says which run writes, or wrote, to a folder. The run holds a lock on it, which ends with the process."""
@@ -36,7 +37,8 @@ _locks: dict[Path, TextIO] = {}
 def open_results(options: Options, comm: MPI.Comm = MPI.COMM_WORLD, *, adds: bool = False) -> Path:
     """The folder for the results of a run, locked until the process ends, with ``parameters.toml`` in it. Collective.
 
-    Of a run with ``--site`` it also has ``site.toml``, a copy of that file as it is now, since sites are changed from run to run.
+    Of a run with ``--site`` it also has ``site.toml``, a copy of that file as it is now, since sites are changed from run to run, and
+    ``site-2.toml`` and so on of the files that it extends.
 
     Without ``--output`` it is ``results/NAME`` of the repository (of the present folder for an installed package), or where that
     holds a run, ``results/NAME-2`` and so on. A folder named by ``--output`` that holds results is refused, unless
@@ -56,9 +58,10 @@ def open_results(options: Options, comm: MPI.Comm = MPI.COMM_WORLD, *, adds: boo
         folder = _opened(options, adds)
         write_parameters(folder / "parameters.toml", options.parameters(), options.study, options.restarts)
         site = getattr(options, "site", None)
-        if site is not None and site.is_file():  # if there is none, the study says so
-            with written_whole(folder / "site.toml") as aside:
-                shutil.copyfile(site, aside)
+        files = [] if site is None or not site.is_file() else site_files(site)  # if there is none, the study says so
+        for number, file in enumerate(files, 1):
+            with written_whole(folder / ("site.toml" if number == 1 else f"site-{number}.toml")) as aside:
+                shutil.copyfile(file, aside)
         return folder
 
     folder = comm.bcast(on_first_rank(comm, opened, OutputError))

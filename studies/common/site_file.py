@@ -218,7 +218,7 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
     for soil, given in soils.items():
         where = f"{path}: soils.{soil}"
         weights[soil] = unit_weight_of(given, where)
-        parameters = located(part_of(given, law_keys()), path)
+        parameters = located(part_of(given, law_keys()), path.parent)
         heights: dict[int, float] = {}
         if not set(parameters) - {"porosity"}:
             raise mpm.InputError(f"{where} has no law, which this study needs: material, and the parameters of the law")
@@ -232,7 +232,7 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
             laws |= dict.fromkeys(bridge.names_of(cell_tags).get(soil, (soil,)), law)
         say(unit_doubt(parameters, where, heights.values()))
     others = {
-        name: law_at(located(given, path), None, f"{path}: laws.{name}")
+        name: law_at(located(given, path.parent), None, f"{path}: laws.{name}")
         for name, given in table.get("laws", {}).items()
     }
     members = {name: member_of(given, f"{path}: members.{name}") for name, given in table.get("members", {}).items()}

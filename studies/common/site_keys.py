@@ -7,17 +7,17 @@ from inspect import signature
 from pathlib import Path
 from typing import Any
 
-import tomllib
-
 import mpm_core as mpm
 from fenics_bridge import water
 
 from .parameters import unknown_key
-from .site_laws import is_number, law_keys
+from .site_laws import is_number, law_keys, located
+from .site_tables import MOST_FILES, merged, parsed
 
 DAY = 86400.0
 MM_PER_DAY = 1e-3 / DAY
 KEYS = {
+    "extends": "the file of another site, of which this one changes or adds keys",
     "mesh": "a .geo or .msh file beside the site's",
     "cell_size": "a size of cells [m]",
     "constants": "values of other constants of the .geo file",
@@ -67,23 +67,13 @@ def read_site_table(path: Path, needed: Sequence[str] = ()) -> dict[str, Any]:
     Raises:
         InputError: it cannot be read, is not TOML, has a key that no study knows or lacks one that is needed.
     """
-    try:
-        with open(path, "rb") as file:
-            table = tomllib.load(file)
-    except OSError as error:
-        raise mpm.InputError(f"cannot read the site {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise mpm.InputError(f"the site {path} is not TOML: {error}") from None
-    _require_known(table, KEYS, str(path))
+    table = _extended(path)
     for key in ("mesh", "soils", *needed):
         if key not in table:
             raise mpm.InputError(f"{path} has no {key!r}, which this study needs: {KEYS[key]}")
     size = table.get("cell_size", 1.0)
     if not (is_number(size) and size > 0):
         raise mpm.InputError(f"{path}: cell_size is {size!r}, expected a number above 0 [m]")
-    for key, known in (("soils", (*FLOW, "unit_weight", *law_keys())), ("laws", law_keys()), ("boundaries", WATER)):
-        for name, given in _table_at(table, key, str(path)).items():
-            _require_known(given, known, f"{path}: {key}.{name}")
     for name, given in _table_at(table, "members", str(path)).items():
         _require_member(given, f"{path}: members.{name}")
     stages = table.get("stages", [])
@@ -96,6 +86,30 @@ def read_site_table(path: Path, needed: Sequence[str] = ()) -> dict[str, Any]:
         for name, given in _table_at(stage, "boundaries", f"{path}: stages[{k}]").items():
             _require_known(given, WATER, f"{path}: stages[{k}].boundaries.{name}")
     return table
+
+
+def _extended(path: Path, depth: int = 1) -> dict[str, Any]:
+    """The file of a site as a table, over those that it extends; depth: number of this file among them."""
+    table = parsed(path)
+    _require_known(table, KEYS, str(path))
+    for key, known in (("soils", (*FLOW, "unit_weight", *law_keys())), ("laws", law_keys()), ("boundaries", WATER)):
+        for name, given in _table_at(table, key, str(path)).items():
+            _require_known(given, known, f"{path}: {key}.{name}")
+    if "extends" not in table:
+        return table
+    base = table.pop("extends")
+    if not isinstance(base, str):
+        raise mpm.InputError(f"{path}: extends is {base!r}, expected the file of a site")
+    if depth == MOST_FILES:
+        raise mpm.InputError(
+            f"{path}: extends is {base!r}, expected at most {MOST_FILES} files that extend one another"
+        )
+    below, folder = _extended(path.parent / base, depth + 1), (path.parent / base).parent
+    if "mesh" in below:
+        below["mesh"] = str(folder.resolve() / str(below["mesh"]))
+    for key in ("soils", "laws"):
+        below[key] = {name: located(law, folder.resolve()) for name, law in below.get(key, {}).items()}
+    return merged(below, table)
 
 
 def _table_at(table: Mapping[str, Any], key: str, where: str) -> dict[str, Any]:

@@ -36,6 +36,11 @@ def law_keys() -> Sequence[str]:
     return [action.dest for action in _parser()._actions if action.dest not in places]
 
 
+def law_units() -> dict[str, str]:
+    """Units of the parameters of laws by key; "-" of those that have none."""
+    return {key: getattr(action, "unit", "-") for action in _parser()._actions if (key := action.dest) in law_keys()}
+
+
 def unit_weight_of(soil: dict, where: str) -> float:
     """Unit weight [N/m3] in the table of a soil; where: it stands, for messages."""
     if "unit_weight" not in soil:
@@ -65,9 +70,9 @@ def law_at(table: dict, height: float | None, where: str) -> Any:
     return law_of(argparse.Namespace(**values))
 
 
-def located(table: dict, path: Path) -> dict:
-    """The table of a law whose files are beside the site's; path: of the site's."""
-    files = {key: str(path.parent / table[key]) for key in ("umat", "python_law") if key in table}
+def located(table: dict, folder: Path) -> dict:
+    """The table of a law whose files are in the folder of the site's."""
+    files = {key: str(folder / str(table[key])) for key in ("umat", "python_law") if key in table}
     return table | files
 
 

@@ -1,0 +1,93 @@
+"""Files of sites that extend others."""
+
+from pathlib import Path
+
+import pytest
+import study_main  # noqa: F401
+from common.site_keys import read_site_table
+from common.site_tables import MOST_FILES, site_files
+
+from mpm_core import InputError
+
+BASE = """
+mesh = "ground.geo"
+cell_size = 2.0
+[soils.clay]
+unit_weight = 17e3
+cohesion = {value = 10e3, per_metre = 1e3, top = 0.0}
+[soils.sand]
+unit-weight = 19e3
+python_law = "law.py:Sand"
+[[stages]]
+name = "in situ"
+"""
+
+
+def written(path, text):
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(text)
+    return path
+
+
+@pytest.fixture
+def base(tmp_path):
+    return written(tmp_path / "base" / "site.toml", BASE)
+
+
+def test_values_of_tables_change_one_by_one_and_files_stay_beside_the_base(tmp_path, base):
+    variant = written(tmp_path / "dry" / "site.toml", """
+        extends = "../base/site.toml"
+        cell_size = 1.0
+        [soils.clay]
+        cohesion = {value = 20e3}
+        [soils.sand]
+        unit_weight = 20e3
+        [boundaries.top]
+        rain = 5.0
+    """)  # fmt: skip
+    table, folder = read_site_table(variant), base.parent.resolve()
+    assert table["soils"] == {
+        "clay": {"unit_weight": 17e3, "cohesion": {"value": 20e3, "per_metre": 1e3, "top": 0.0}},
+        "sand": {"unit_weight": 20e3, "python_law": f"{folder}/law.py:Sand"},
+    }
+    assert Path(table["mesh"]) == folder / "ground.geo"
+    assert (table["cell_size"], table["boundaries"], table["stages"]) == (
+        1.0,
+        {"top": {"rain": 5.0}},
+        [{"name": "in situ"}],
+    )
+    assert "extends" not in table and read_site_table(base)["mesh"] == "ground.geo"
+
+
+def test_lists_are_replaced_as_a_whole(tmp_path, base):
+    variant = written(
+        tmp_path / "site.toml", f'extends = "{base}"\n[[stages]]\nname = "one"\n[[stages]]\nname = "two"\n'
+    )
+    assert [stage["name"] for stage in read_site_table(variant)["stages"]] == ["one", "two"]
+
+
+def test_a_variant_of_a_variant_is_one_of_the_base(tmp_path, base):
+    first = written(tmp_path / "first.toml", 'extends = "base/site.toml"\n[soils.clay]\nunit_weight = 16e3\n')
+    second = written(tmp_path / "second.toml", 'extends = "first.toml"\ncell_size = 0.5\n')
+    table = read_site_table(second)
+    assert (table["cell_size"], table["soils"]["clay"]["unit_weight"]) == (0.5, 16e3)
+    assert site_files(second) == [second, first, base.parent.parent / "base" / "site.toml"]
+
+
+@pytest.mark.parametrize("text, expected", [
+    ("extends = 3", "extends is 3, expected the file of a site"),
+    ('extends = "none.toml"', "cannot read the site .*none.toml: No such file"),
+    ('extends = "base/site.toml"\n[soils.clay]\ncohesoin = 1.0', "site.toml: soils.clay: unknown key 'cohesoin'"),
+    ('extends = "site.toml"', f"expected at most {MOST_FILES} files that extend one another"),
+])  # fmt: skip
+def test_mistakes_are_named(tmp_path, base, text, expected):
+    variant = written(tmp_path / "site.toml", text)
+    with pytest.raises(InputError, match=expected):
+        read_site_table(variant)
+
+
+def test_a_wrong_key_is_that_of_the_file_that_has_it(tmp_path, base):
+    base.write_text(BASE.replace("unit_weight", "unit_wieght"))
+    variant = written(tmp_path / "variant.toml", 'extends = "base/site.toml"\n')
+    with pytest.raises(InputError, match=r"base/site.toml: soils.clay: unknown key 'unit_wieght'"):
+        read_site_table(variant)
