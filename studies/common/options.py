@@ -31,6 +31,7 @@ from .parameters import (
     checked_values,
     described,
     did_you_mean,
+    is_repeated,
     present_name,
     read_parameters,
 )
@@ -105,6 +106,9 @@ class _Parser(argparse.ArgumentParser):
         if given.parameters is not None:
             values |= read_parameters(Path(given.parameters), self._actions)
         self._refuse_code(options.given, values)
+        for action in self._actions:  # which would add to the list of the file
+            if is_repeated(action) and options.given.intersection(action.option_strings):
+                values.pop(action.dest, None)
         self.set_defaults(**values)
 
     def _refuse_code(self, words: set[str], values: Mapping[str, object]) -> None:

@@ -132,7 +132,7 @@ def write_parameters(
     for parameter in parameters:
         if parameter.value is not None:
             unit = "" if parameter.unit == "-" else f" [{parameter.unit}]"
-            lines.append(f"{parameter.name} = {_to_toml(parameter.value)}  # {parameter.meaning}{unit}")
+            lines.append(f"{parameter.name} = {to_toml(parameter.value)}  # {parameter.meaning}{unit}")
     write_text(path, "\n".join(lines) + "\n")
 
 
@@ -142,13 +142,21 @@ def _named(actions: Sequence[argparse.Action]) -> dict[str, argparse.Action]:
     return {action.option_strings[0].removeprefix("--"): action for action in shown}
 
 
-def _to_toml(value: object) -> str:
+def to_toml(value: object) -> str:
+    """A value as TOML has it; of a mapping an inline table."""
     # A JSON text is a TOML text, and Python's shortest form of a number is TOML and is read back as the same number.
     if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(map(_to_toml, value)) + "]"
+        return "[" + ", ".join(map(to_toml, value)) + "]"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{json.dumps(key)} = {to_toml(one)}" for key, one in value.items()) + "}"
     if isinstance(value, Path):
         value = str(value.resolve())
     return repr(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else json.dumps(value)
+
+
+def is_repeated(action: argparse.Action) -> bool:
+    """Whether an option may be repeated, and is a list of all that was given."""
+    return isinstance(action, argparse._AppendAction)
 
 
 def _from_toml(action: argparse.Action, value: object) -> Any:
@@ -157,7 +165,7 @@ def _from_toml(action: argparse.Action, value: object) -> Any:
         if not isinstance(value, bool):
             raise ValueError(f"is {value!r}, expected true or false")
         return value
-    if isinstance(value, list) and action.nargs is not None:
+    if isinstance(value, list) and (action.nargs is not None or is_repeated(action)):
         return [_single(action, one) for one in value]
     return _single(action, value)
 

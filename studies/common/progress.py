@@ -25,12 +25,14 @@ class Progress:
         until: simulated time at the end, s.
         pause: wall time between two lines where there is no terminal, s.
         unit: in which simulated times are given and shown.
+        counted: what the rate counts.
     """
 
     def __init__(
-        self, title: str, until: float, comm: MPI.Comm = MPI.COMM_WORLD, pause: float = 10.0, unit: str = "s"
-    ) -> None:
-        self._title, self._unit = title, unit
+        self, title: str, until: float, comm: MPI.Comm = MPI.COMM_WORLD, pause: float = 10.0, unit: str = "s",
+        counted: str = "steps",
+    ) -> None:  # fmt: skip
+        self._title, self._unit, self._counted = title, unit, counted
         self._until = until
         self._shown = comm.rank == 0
         self._pause = pause
@@ -55,7 +57,7 @@ class Progress:
         if not self._shown:
             return
         elapsed = max(clock.monotonic() - self._start, 1e-9)
-        facts = [f"{steps / elapsed:.4g} steps/s", *(f"{name} {text}" for name, text in quantities.items())]
+        facts = [f"{steps / elapsed:.4g} {self._counted}/s", *(f"{name} {text}" for name, text in quantities.items())]
         if self._bar is not None:
             self._bar.n = min(time, self._until)
             self._bar.set_postfix_str(", ".join(facts))

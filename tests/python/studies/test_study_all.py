@@ -42,6 +42,7 @@ SMALL = {
     "seepage": "--cell-size 4 --days 20 --frames 2",
     "slope": "--time 0.1 --frames 2 --mesh fitted --cell-size 0.5 --particles-per-cell 1",
     "slope_schemes": "--time 0.1 --frames 2 --mesh fitted --cell-size 0.5 --particles-per-cell 1 " "--longer-steps 1",
+    "sweep": "--vary young=1e5,2e5 --result volumetric_strain element_test --steps 5",
     "wall": "--cell-size 0.25 --particles-per-cell 1 --speed 0.05 --frames 2",
     "verification": "--quick --cases column",
 }
@@ -110,7 +111,7 @@ def first_run(tmp_path_factory):
     def run(name):
         if name not in known:
             folder = tmp_path_factory.mktemp(name)
-            known[name] = folder, main(name, [*SMALL[name].split(), "--output", folder])
+            known[name] = folder, main(name, ["--output", folder, *SMALL[name].split()])
         return known[name]
 
     return run

@@ -1,0 +1,275 @@
+"""A study many times with other parameters: sensitivity, all combinations, or samples of distributions.
+
+Each parameter of --vary is an option of the study or a key of its site file, such as soils.clay.cohesion. It has a list of values
+(20,25,30), equal steps (20:30:5, five values from 20 to 30) or a distribution (normal:MEAN:SD, lognormal:MEAN:SD, both also with
+:LOW:HIGH for limits, uniform:LOW:HIGH, triangular:LOW:MODE:HIGH). Lists give all combinations; distributions need --samples. The
+study and its options come last:
+
+    sweep --vary cohesion=2e3:6e3:5 --vary friction-angle=20,25,30 safety --meshes 1
+    sweep --vary soils.core.cohesion=lognormal:10e3:3e3 --samples 200 --limit factor_of_safety=1 safety --site dam.toml
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import REMAINDER, ArgumentParser, Namespace
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from common.figures import Pictures
+from common.interrupt import Interrupt
+from common.options import add_count, add_flag, check, study_parser
+from common.page import Page
+from common.parameters import did_you_mean
+from common.progress import Progress
+from common.ranks import run_study
+from common.results import open_results
+from common.site_laws import law_units
+from common.summary import write_summary
+from common.sweep_plan import Row, Variable, correlation_of, plan, variable_of
+from common.sweep_plots import label, picture_of
+from common.sweep_results import (
+    drawn_results,
+    ended_before,
+    probability_below,
+    rank_correlations,
+    statistics,
+    values_of,
+    write_table,
+)
+from common.sweep_runs import Run, Study, carry_out, log_of, processors, require_names, runs_of, study_of, take_results
+from mpi4py import MPI
+from talus import find
+
+from mpm_core import InputError
+
+BAD_INPUT = 2
+"""Exit code of a run whose options or site are not possible"""
+
+
+# --- 1. Options ------------------------------------------------------------------------------------------------------
+
+
+def parser() -> ArgumentParser:
+    """Parser of all options; the help shows their units."""
+    p = study_parser(__doc__)
+    p.add_argument("--vary", action="append", default=[], metavar="NAME=VALUES", help="a parameter and its values, see above; may be "
+                   "repeated")  # fmt: skip
+    add_count(p, "--samples", None, "samples of the parameters that have distributions")
+    p.add_argument("--correlate", action="append", default=[], metavar="NAME,NAME=R", help="correlation of two parameters that have "
+                   "distributions, between -1 and 1; may be repeated")  # fmt: skip
+    add_count(p, "--seed", 1, "number from which the samples follow")
+    add_flag(
+        p,
+        "--one-at-a-time",
+        "change one parameter in each run; one with a distribution to the values that are exceeded in 95 and in 5 of 100 "
+        "cases",
+    )
+    p.add_argument("--result", action="append", default=[], metavar="NAME", help="a result that is drawn, by its name in summary.json; "
+                   "may be repeated (default: the first ones that differ between runs)")  # fmt: skip
+    p.add_argument("--limit", action="append", default=[], metavar="NAME=X", help="a limit of a result, of which the probability of being "
+                   "below it is found; may be repeated")  # fmt: skip
+    add_count(p, "--jobs", None, "runs at once (default: processors over --run-ranks)")
+    add_count(p, "--run-ranks", 1, "MPI ranks of each run")
+    add_flag(p, "--resume", "go on with the sweep in the folder of --output: runs that gave results are kept; with more --samples, "
+             "others follow")  # fmt: skip
+    p.add_argument("--run", nargs=REMAINDER, default=[], metavar="STUDY ...", help="the study and its options, which may also stand at "
+                   "the end without --run")  # fmt: skip
+    return p
+
+
+def parse(arguments: Sequence[str] | None = None) -> Namespace:
+    """The options of the sweep; the words from the study's name on are not looked at."""
+    p, words = parser(), list(sys.argv[1:] if arguments is None else arguments)
+    own, run = split(p, words)
+    a = p.parse_args(own)
+    a.run = run or a.run
+    check(
+        p,
+        MPI.COMM_WORLD.size == 1,
+        "the sweep starts its runs itself; expected one rank, and --run-ranks N for N ranks of each run",
+    )
+    check(p, bool(a.run), "no study is named, expected its name and options at the end")
+    check(p, bool(a.vary), "--vary is not given, expected a parameter and its values, such as cohesion=1e3,2e3")
+    for name in ("--output", "--overwrite"):
+        stray = any(word.split("=")[0] == name for word in a.run[1:])
+        check(
+            p,
+            not stray,
+            f"{name} is given after the study, expected it before: each run has a folder of its own in that of the sweep",
+        )
+    check(p, not a.resume or a.output is not None, "--resume is given, expected --output DIR with it")
+    check(
+        p, not (a.resume and a.overwrite), "--overwrite is given, expected it without --resume, which keeps the results"
+    )
+    check(
+        p,
+        not (a.one_at_a_time and (a.samples or a.correlate)),
+        "--one-at-a-time is given, expected no --samples or --correlate with it",
+    )
+    return a
+
+
+def split(p: ArgumentParser, words: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The words of the sweep, and those from the study's name on."""
+    flags = {name for action in p._actions if action.nargs == 0 for name in action.option_strings}
+    k = 0
+    while k < len(words) and words[k].startswith("-"):
+        if words[k] == "--run":
+            return list(words[:k]), list(words[k + 1 :])
+        k += 1 if words[k] in flags or "=" in words[k] else 2
+    return list(words[:k]), list(words[k:])
+
+
+def limits_of(words: Sequence[str]) -> dict[str, float]:
+    """Limits of results by name."""
+    limits = {}
+    for word in words:
+        name, _, text = word.partition("=")
+        try:
+            limits[name] = float(text)
+        except ValueError:
+            raise InputError(f"--limit is {word!r}, expected NAME=X, such as factor_of_safety=1") from None
+    return limits
+
+
+# --- 2. All runs -----------------------------------------------------------------------------------------------------
+
+
+def make_all(
+    runs: list[Run], study: Study, folder: Path, names: Sequence[str], named: Sequence[str], jobs: int
+) -> bool:
+    """Make the runs that have not ended yet, with the table of those that have; returns whether this was interrupted.
+
+    Args:
+        names: of the parameters.
+        named: results that runs are expected to have.
+        jobs: most runs at once.
+
+    Raises:
+        InputError: the first run to end has refused its options, or has not the results that were named.
+    """
+    waiting, refusals = [run for run in runs if run.code is None], []
+    with Interrupt() as interrupt, Progress("runs", len(runs), unit="runs", counted="runs") as progress:
+        for done, run in enumerate(carry_out(waiting, study, jobs, lambda: bool(refusals) or interrupt.requested()), 1):
+            if done == 1:
+                refusals = refusal(run, named)
+            write_table(folder, runs, names)
+            failed = sum(one.code is not None and not one.results for one in runs)
+            progress.show(len(runs) - len(waiting) + done, done, **({"failed": str(failed)} if failed else {}))
+        if refusals:
+            raise InputError(refusals[0])
+        return interrupt.requested()
+
+
+def refusal(run: Run, named: Sequence[str]) -> list[str]:
+    """Why the runs of a sweep make no sense, by the first that has ended; empty where they do."""
+    if run.code == BAD_INPUT and not run.results:
+        return [f"run {run.number} was refused: {run.reason}"]
+    missing = [name for name in named if run.results and name not in run.results]
+    there = ", ".join(name for name in run.results if "." not in name)
+    return [
+        f"{name} is no result of the study{did_you_mean(name, run.results)}, expected one of {there}"
+        for name in missing
+    ]
+
+
+# --- 3. Results ------------------------------------------------------------------------------------------------------
+
+
+def summarise(
+    runs: list[Run], variables: Sequence[Variable], shown: Sequence[str], limits: dict[str, float], alone: bool
+) -> dict[str, Any]:
+    """Statistics of the results, by name."""
+    random = any(one.quantile is not None for one in variables) and not alone
+    results: dict[str, Any] = {"statistics": {name: statistics(values_of(runs, name)) for name in shown}}
+    if limits and random:
+        results["probabilities"] = {
+            name: probability_below(values_of(runs, name), limit) for name, limit in limits.items()
+        }
+    if random:
+        found = {name: rank_correlations(runs, [one.name for one in variables], name) for name in shown}
+        results["rank_correlations"] = {name: row for name, row in found.items() if row}
+    return results
+
+
+def said(runs: list[Run], results: dict[str, Any]) -> str:
+    """What is printed at the end."""
+    failed = [run for run in runs if run.code is not None and not run.results]
+    lines = [f"{sum(bool(run.results) for run in runs)} of {len(runs)} runs have results"]
+    lines += [f"run {run.number} failed: {run.reason} ({log_of(run)})" for run in failed[:3]]
+    if failed:
+        lines.append("runs without results are left out of all numbers")
+    for name, row in results["statistics"].items():
+        if row["runs"]:
+            spread = (
+                f", mean {row['mean']:.4g}, standard deviation {row['standard_deviation']:.3g}"
+                if "rank_correlations" in results
+                else ""
+            )
+            lines.append(f"{label(name)}: {row['smallest']:.4g} to {row['largest']:.4g}{spread}")
+    for name, row in results.get("probabilities", {}).items():
+        if row["runs"]:
+            lines.append(f"{label(name)} is below {row['limit']:g} in {row['runs_below']} of {row['runs']} runs, "
+                         f"{row['probability_below']:.2%} (95 % interval {row['interval_low']:.2%} to {row['interval_high']:.2%})")  # fmt: skip
+    return "\n".join(lines)
+
+
+def prepared(a: Namespace) -> tuple[Study, list[Variable], list[Row]]:
+    """The study, the parameters that vary and the values of all runs.
+
+    Raises:
+        InputError: an option that is not possible, or a parameter that the study or its site does not have.
+    """
+    script = find.study_path(a.run[0])
+    if script is None:
+        raise InputError(f"there is no study {a.run[0]!r}, expected one of {', '.join(find.studies())}")
+    variables = [variable_of(word) for word in a.vary]
+    rows = plan(variables, a.samples, dict(map(correlation_of, a.correlate)), a.seed, a.one_at_a_time)
+    study = study_of(script, a.run[1:], a.run_ranks)
+    require_names(study, [one.name for one in variables])
+    return study, variables, rows
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    a = parse(arguments)
+    limits, (study, variables, rows) = limits_of(a.limit), prepared(a)
+    a.run, names, named = [a.run[0], *study.words], [one.name for one in variables], [*a.result, *limits]
+    kept = ended_before(a.output, rows, names) if a.resume else {}
+    folder = open_results(a, MPI.COMM_SELF, adds=a.resume)
+    runs = runs_of(study, rows, folder)
+    for run in runs:
+        if run.number in kept:
+            run.code, run.seconds = kept[run.number]
+            take_results(run)
+    print(
+        f"{len(runs)} runs of {study.script.stem}" + (f", of which {len(kept)} are there" if kept else ""), flush=True
+    )
+    interrupted = make_all(runs, study, folder, names, named, a.jobs or max(1, processors() // a.run_ranks))
+    there = sum(bool(run.results) for run in runs)
+    shown = drawn_results(runs, named) if there else []
+    results = summarise(runs, variables, shown, limits, a.one_at_a_time)
+    labels = {name: _with_unit(name, {**law_units(), **study.units}) for name in names}
+    pictures: Pictures = {
+        path.stem: partial(picture_of(runs, variables, name, labels, a.one_at_a_time, limits.get(name)), path)
+        for name in shown
+        if (path := folder / f"sweep_{name.replace('.', '_')}.png")
+    }
+    table = [{"run": run.number, **run.values, **{name: run.results.get(name) for name in shown}} for run in runs]
+    summary = {"study": study.script.stem, "runs": len(runs), "runs_with_results": there, **results, "table": table}
+    if interrupted:
+        summary["stopped_because"] = f"it was interrupted; --resume --output {folder} goes on with it"
+    code = write_summary(folder, a, summary, MPI.COMM_SELF, Page(), pictures, said(runs, results))
+    return code or int(there < len(runs))
+
+
+def _with_unit(name: str, units: dict[str, str]) -> str:
+    """A parameter with its unit, as an axis shows it."""
+    unit = units.get(name.replace("_", "-") if "." not in name else name.removesuffix(".value").split(".")[-1], "-")
+    return name if unit == "-" else f"{name} [{unit}]"
+
+
+if __name__ == "__main__":
+    run_study(main)

@@ -1,0 +1,185 @@
+"""Values of the runs of a sweep, and the statistics of their results."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import study_main  # noqa: F401
+from common.site_tables import merged
+from common.sweep_plan import correlation_of, plan, variable_of
+from common.sweep_results import changes_alone, probability_below, rank_correlations, statistics
+from common.sweep_runs import Run, numbers_of, site_with
+from scipy import stats
+
+from mpm_core import InputError
+
+SITE = Path("site.toml")
+
+
+def column(rows, name):
+    return np.array([row[name] for row in rows])
+
+
+def run(number, values, **results):
+    return Run(number, values, Path(), [], 0, 0.0, results)
+
+
+def test_lists_and_steps_give_all_combinations():
+    rows = plan([variable_of("cohesion=1e3,2e3"), variable_of("friction-angle=20:30:3")])
+    assert rows == [{"cohesion": c, "friction-angle": phi} for c in (1e3, 2e3) for phi in (20.0, 25.0, 30.0)]
+
+
+def test_values_of_a_list_have_their_types():
+    assert variable_of("a=3,0.5,true,P2").values == (3, 0.5, True, "P2")
+    assert variable_of("python-law=law.py:Sand").values == ("law.py:Sand",)
+
+
+@pytest.mark.parametrize("text, distribution", [
+    ("normal:5:2", stats.norm(5, 2)),
+    ("uniform:2:6", stats.uniform(2, 4)),
+    ("triangular:0:1:4", stats.triang(0.25, 0, 4)),
+    ("normal:5:2:4:9", stats.truncnorm(-0.5, 2, 5, 2)),
+])  # fmt: skip
+def test_samples_have_the_moments_of_their_distribution(text, distribution):
+    values = column(plan([variable_of(f"x={text}")], samples=2000), "x")
+    assert values.mean() == pytest.approx(distribution.mean(), abs=0.01 * distribution.std())
+    assert values.std() == pytest.approx(distribution.std(), rel=0.01)
+    # A sequence that fills the interval evenly is nearer to the distribution than 1/sqrt(n), which random numbers are.
+    assert stats.kstest(values, distribution.cdf).statistic < 0.1 / math.sqrt(2000)
+
+
+def test_lognormal_values_have_the_mean_and_the_deviation_that_are_given():
+    values = column(plan([variable_of("x=lognormal:10e3:4e3")], samples=4000), "x")
+    assert values.mean() == pytest.approx(10e3, rel=0.01)
+    assert values.std() == pytest.approx(4e3, rel=0.03)
+
+
+def test_correlated_samples_keep_their_distributions():
+    variables = [variable_of("c=normal:10:2"), variable_of("phi=uniform:20:30")]
+    rows = plan(variables, 4000, {("c", "phi"): -0.5})
+    c, phi = column(rows, "c"), column(rows, "phi")
+    scores = stats.norm.ppf((phi - 20) / 10)
+    assert np.corrcoef(c, scores)[0, 1] == pytest.approx(-0.5, abs=0.02)
+    assert (phi.mean(), phi.std()) == pytest.approx((25, 10 / math.sqrt(12)), rel=0.01)
+
+
+def test_more_samples_continue_the_same_sequence_at_each_value_of_a_list():
+    variables = [variable_of("size=1,2"), variable_of("c=normal:10:2")]
+    few, many = plan(variables, 3, seed=7), plan(variables, 5, seed=7)
+    assert many[:6] == few and len(many) == 10
+    assert column(few, "c")[::2] == pytest.approx(column(few, "c")[1::2])  # the same samples for both sizes
+    assert plan(variables, 3, seed=8) != few
+
+
+def test_one_at_a_time_begins_with_an_unchanged_run():
+    rows = plan([variable_of("a=1,2"), variable_of("b=normal:10:2")], one_at_a_time=True)
+    tail = 2 * 1.6448536
+    assert rows[:3] == [{}, {"a": 1}, {"a": 2}]
+    assert [row["b"] for row in rows[3:]] == pytest.approx([10 - tail, 10 + tail], rel=1e-5)
+
+
+@pytest.mark.parametrize("word, expected", [
+    ("cohesion", "expected NAME=VALUES"),
+    ("=3", "expected NAME=VALUES"),
+    ("c=1:2", "expected FROM:TO:COUNT"),
+    ("c=1:2:1", "at least two values"),
+    ("c=normal:5", "expected normal:MEAN:SD, or with :LOW:HIGH"),
+    ("c=normal:5:-1", "standard deviation above 0"),
+    ("c=normal:5:0.1:90:91", "limits LOW:HIGH between which there are values"),
+    ("c=lognormal:-5:1", "a mean and a standard deviation above 0"),
+    ("c=uniform:5:1", "rising numbers LOW:HIGH"),
+    ("c=triangular:1:5:2", "rising numbers LOW:MODE:HIGH"),
+])  # fmt: skip
+def test_impossible_values_are_refused_by_name(word, expected):
+    with pytest.raises(InputError, match="--vary is") as error:
+        variable_of(word)
+    assert expected in str(error.value) and repr(word) in str(error.value)
+
+
+def test_samples_and_distributions_need_each_other():
+    with pytest.raises(InputError, match="--samples is None, expected a number with c"):
+        plan([variable_of("c=normal:5:1")])
+    with pytest.raises(InputError, match="--samples is 4, expected none"):
+        plan([variable_of("c=1,2")], 4)
+
+
+def test_impossible_correlations_are_refused():
+    for word in ("a,b", "a,a=0.5", "a,b=1", "a=0.5"):
+        with pytest.raises(InputError, match="expected two names and a coefficient"):
+            correlation_of(word)
+    variables = [variable_of(f"{name}=normal:0:1") for name in "abc"]
+    with pytest.raises(InputError, match="names d, expected two of the random parameters a, b, c"):
+        plan(variables, 4, {("a", "d"): 0.5})
+    with pytest.raises(InputError, match="not possible together"):
+        plan(variables, 4, {("a", "b"): 0.9, ("b", "c"): 0.9, ("a", "c"): -0.9})
+
+
+def test_keys_of_a_site_change_values_in_tables_and_lists():
+    table = {"soils": {"layer 1": {"cohesion": 1.0, "young": 5.0}, "layer 2": {"cohesion": 1.0}, "clay": {"cohesion": {"value": 2.0}}},
+             "stages": [{"name": "in situ"}, {"name": "dam", "water_level": 1.0}]}  # fmt: skip
+    changes = {
+        "soils.layer*.cohesion": 3.0,
+        "soils.clay.cohesion.value": 4.0,
+        "stages.1.water-level": 5.0,
+        "classes": 7,
+    }
+    new = merged(table, site_with(table, changes, SITE))
+    assert new["soils"] == {
+        "layer 1": {"cohesion": 3.0, "young": 5.0},
+        "layer 2": {"cohesion": 3.0},
+        "clay": {"cohesion": {"value": 4.0}},
+    }
+    assert new["stages"] == [{"name": "in situ"}, {"name": "dam", "water_level": 5.0}] and new["classes"] == 7
+    assert table["stages"][1]["water_level"] == 1.0
+
+
+@pytest.mark.parametrize("name, there", [("soils.sand.cohesion", "it has clay"), ("soils.clay.cohesion.value", "no table but 1.0"),
+                                         ("stages.3.name", "the numbers 0 to 0")])  # fmt: skip
+def test_a_key_in_a_table_that_a_site_does_not_have_is_refused(name, there):
+    table = {"soils": {"clay": {"cohesion": 1.0}}, "stages": [{"name": "in situ"}]}
+    with pytest.raises(InputError, match=f"names {name}, but site.toml has no .*{there}"):
+        site_with(table, {name: 1.0}, SITE)
+
+
+def test_numbers_of_a_summary_have_names_with_dots():
+    summary = {"factor": 1.5, "curve": [1, 2], "text": "a", "meshes": [{"size": 1.0, "shown": True}, {"size": 0.5}]}
+    found = {name: one for key, part in summary.items() for name, one in numbers_of(part, key).items()}
+    assert found == {"factor": 1.5, "meshes.0.size": 1.0, "meshes.0.shown": True, "meshes.1.size": 0.5}
+
+
+def test_the_probability_of_failure_is_that_of_a_normal_factor_of_safety():
+    # F = c / 8 with c normal (10, 2): P(F < 1) = Phi(-1), reliability index 1.
+    values = column(plan([variable_of("c=normal:10:2")], 1000), "c") / 8
+    found = probability_below(values, 1.0)
+    assert found["probability_below"] == pytest.approx(stats.norm.cdf(-1), abs=2e-3)
+    assert found["reliability_index"] == pytest.approx(1, abs=0.01)
+    assert found["interval_low"] < stats.norm.cdf(-1) < found["interval_high"]
+
+
+def test_no_failure_in_some_runs_leaves_an_upper_bound():
+    # Wilson's interval of 0 of n ends at z^2 / (n + z^2), with z = 1.96.
+    found = probability_below(np.full(40, 2.0), 1.0)
+    assert found["probability_below"] == 0 and math.isnan(found["reliability_index"])
+    assert found["interval_low"] == 0 and found["interval_high"] == pytest.approx(
+        1.96**2 / (40 + 1.96**2), rel=1e-3
+    )
+
+
+def test_statistics_leave_out_runs_without_a_result():
+    found = statistics(np.array([1.0, math.nan, 3.0]))
+    assert (found["runs"], found["mean"], found["standard_deviation"]) == (2, 2.0, pytest.approx(math.sqrt(2)))
+    assert statistics(np.array([math.nan])) == {"runs": 0}
+
+
+def test_rank_correlations_are_those_of_monotonic_functions():
+    runs = [
+        run(k, {"x": x, "y": (7 * k) % 10, "kind": "P1"}, f=math.exp(-x)) for k, x in enumerate(np.linspace(0, 9, 10))
+    ]
+    found = rank_correlations(runs, ["x", "y", "kind"], "f")
+    assert found["x"] == pytest.approx(-1) and abs(found["y"]) < 0.5 and "kind" not in found
+
+
+def test_what_changes_a_result_most_comes_last():
+    runs = [run(1, {}, f=10.0), run(2, {"a": 1}, f=14.0), run(3, {"a": 2}, f=11.0), run(4, {"b": 1}, f=8.0)]
+    assert changes_alone(runs, "f") == [("b", 1, 8.0), ("a", 1, 14.0), ("a", 2, 11.0)]
