@@ -321,7 +321,7 @@ def write_maps(
     a: Namespace, found: dict[str, terrain.Raster], rupture: terrain.Raster, watched: Watched, folder: Path
 ) -> Pictures:
     """Maps as grids, the ground as a surface for ParaView, and pictures to draw. On the first rank."""
-    for name, raster in found.items():
+    for name, raster in {**found, "ground": rupture}.items():
         terrain.write_raster(folder / f"{name}.{a.grids}", raster)
     rupture.triangles().write(folder / "ground.obj")
     marks = {"bodies": [one.body for one in watched.structures], "places": watched.places}

@@ -28,6 +28,7 @@ from common.ranks import run_study
 from common.results import open_results
 from common.site_laws import law_units
 from common.summary import write_summary
+from common.sweep_maps import hazard_maps
 from common.sweep_plan import Row, Variable, correlation_of, plan, variable_of
 from common.sweep_plots import label, picture_of
 from common.sweep_results import (
@@ -257,6 +258,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for name in shown
         if (path := folder / f"sweep_{name.replace('.', '_')}.png")
     }
+    pictures = {**pictures, **hazard_maps(runs, folder)}
     table = [{"run": run.number, **run.values, **{name: run.results.get(name) for name in shown}} for run in runs]
     summary = {"study": study.script.stem, "runs": len(runs), "runs_with_results": there, **results, "table": table}
     if interrupted:

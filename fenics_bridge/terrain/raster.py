@@ -126,9 +126,13 @@ class Raster:
 
 
 def read_raster(
-    path: str | Path, *, crs: str | None = None, window: tuple[Sequence[float], Sequence[float]] | None = None
+    path: str | Path,
+    *,
+    crs: str | None = None,
+    window: tuple[Sequence[float], Sequence[float]] | None = None,
+    heights: bool = True,
 ) -> Raster:
-    """Read heights from a file: an ESRI ASCII grid (.asc), GeoTIFF (.tif), or points x y z of a grid in any order (.xyz, .txt).
+    """Read heights, or another map, from a file: an ESRI ASCII grid (.asc), GeoTIFF (.tif), or points x y z of a grid in any order (.xyz, .txt).
 
     GeoTIFF needs rasterio (Debian: python3-rasterio).
 
@@ -136,10 +140,11 @@ def read_raster(
         path: the file.
         crs: coordinate reference, where neither the file nor a .prj beside it names one; "local" for metres on a plane.
         window: corners ((x, y), (x, y)) [m] of the part to take; outside of it there may be gaps.
+        heights: whether the values are heights of the ground; False for a map such as that of a slide, whose gaps are NaN.
 
     Raises:
-        InputError: a file that is missing or damaged, points that are no grid of square cells, gaps (with their number and the
-            first one), degrees in place of metres, an unknown coordinate reference, and GeoTIFF without rasterio.
+        InputError: a file that is missing or damaged, points that are no grid of square cells, gaps in heights (with their number and
+            the first one), degrees in place of metres, an unknown coordinate reference, and GeoTIFF without rasterio.
     """
     path = Path(path)
     readers = {".asc": _read_ascii, ".xyz": _read_points, ".txt": _read_points}
@@ -156,7 +161,8 @@ def read_raster(
         raise InputError(f"path is {str(path)!r}, expected a file ending in {', '.join((*readers, *TIFF))}")
     raster = Raster(x, y, values, _reference(path, crs if crs is not None else inside or None))
     raster = raster if window is None else raster.window(*window)
-    _check_heights(raster, str(path))
+    if heights:
+        _check_heights(raster, str(path))
     return raster
 
 

@@ -36,6 +36,7 @@ def save_map(
     label: str,
     bodies: Sequence[mpm.Triangles] = (),
     places: Places | None = None,
+    limits: tuple[float, float] | None = None,
 ) -> None:
     """Draw a map.
 
@@ -45,6 +46,7 @@ def save_map(
         label: with unit.
         bodies: rigid structures, drawn in plan.
         places: marked and named.
+        limits: of the colours; None to fit.
     """
     x, y = ground.x, ground.y
     h = ground.spacing / 2
@@ -59,9 +61,9 @@ def save_map(
                            colors="#222222", linewidths=0.6)  # fmt: skip
         for label_of_line in ax.clabel(lines, fmt="%g m", fontsize=7):
             label_of_line.set_path_effects([withStroke(linewidth=1.5, foreground="white")])
-        colours = ax.imshow(
-            np.ma.masked_invalid(shown.values), cmap="viridis", extent=extent, origin="lower", alpha=0.85
-        )
+        low, high = limits or (None, None)
+        colours = ax.imshow(np.ma.masked_invalid(shown.values), cmap="viridis", extent=extent, origin="lower", alpha=0.85, vmin=low,
+                            vmax=high)  # fmt: skip
         for body in bodies:
             corners = body.vertices[body.triangles][:, :, :2]
             ax.add_collection(PolyCollection(corners, facecolors=BODY, edgecolors=BODY, linewidths=0.6, zorder=3))

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 import study_main  # noqa: F401
 from common.site_tables import merged
+from common.sweep_maps import hazard_maps
 from common.sweep_plan import correlation_of, plan, variable_of
 from common.sweep_results import changes_alone, probability_below, rank_correlations, statistics
 from common.sweep_runs import Run, numbers_of, site_with
 from scipy import stats
 
+from fenics_bridge.terrain import Raster, read_raster, write_raster
 from mpm_core import InputError
 
 SITE = Path("site.toml")
@@ -183,3 +185,34 @@ def test_rank_correlations_are_those_of_monotonic_functions():
 def test_what_changes_a_result_most_comes_last():
     runs = [run(1, {}, f=10.0), run(2, {"a": 1}, f=14.0), run(3, {"a": 2}, f=11.0), run(4, {"b": 1}, f=8.0)]
     assert changes_alone(runs, "f") == [("b", 1, 8.0), ("a", 1, 14.0), ("a", 2, 11.0)]
+
+
+def slide_maps(folder, number, reached, speed):
+    place = folder / f"{number:03d}"
+    place.mkdir()
+    x, y = np.array([0.0, 2.0, 4.0]), np.array([0.0, 2.0])
+    reached, speed = np.array(reached, float), np.where(np.array(reached) > 0, speed, np.nan)
+    for name, values in {"reached": reached, "speed": speed, "most": 0.5 * speed, "ground": np.tile(x, (2, 1))}.items():
+        write_raster(place / f"{name}.asc", Raster(x, y, values, "local"))
+    return Run(number, {}, place, [], 0, 0.0, {"front_m": 1.0})
+
+
+def test_maps_of_hazard_are_fractions_and_quantiles_of_the_runs(tmp_path):
+    # 20 runs with the speeds 1 to 20 m/s: the first place is reached by all, the second by those above 15 m/s, the third by the last.
+    # At most one of 20 runs exceeds what 95 % do not: 19 m/s, where the slide has been in the 19th run.
+    runs = [slide_maps(tmp_path, k, [[1, k > 15, k > 19], [0, 0, 0]], float(k)) for k in range(1, 21)]
+    runs.append(Run(21, {}, tmp_path / "none", [], 1))
+    pictures = hazard_maps(runs, tmp_path)
+    maps = {name: read_raster(tmp_path / f"{name}.asc", heights=False).values for name in pictures}
+    assert maps["reach_probability"] == pytest.approx(np.array([[1, 0.25, 0.05], [0, 0, 0]]))
+    assert maps["speed_95_percent"] == pytest.approx(np.array([[19, 19, np.nan], [np.nan] * 3]), nan_ok=True)
+    assert maps["most_95_percent"] == pytest.approx(0.5 * maps["speed_95_percent"], nan_ok=True)
+    pictures["reach_probability"]()
+    assert (tmp_path / "reach_probability.png").stat().st_size > 1000
+
+
+def test_runs_on_other_grounds_have_no_common_map(tmp_path):
+    runs = [slide_maps(tmp_path, k, [[1, 1, 0], [0, 0, 0]], 1.0) for k in (1, 2)]
+    write_raster(tmp_path / "002" / "reached.asc", Raster(np.arange(4.0), np.arange(3.0), np.ones((3, 4)), "local"))
+    assert hazard_maps(runs, tmp_path) == {} and not list(tmp_path.glob("*.asc"))
+    assert hazard_maps([run(1, {}, f=1.0), run(2, {}, f=2.0)], tmp_path) == {}
