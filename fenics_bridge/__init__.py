@@ -24,6 +24,7 @@ from fenics_bridge.fem.strength import davis_reduced_strength, davis_strength, r
 from fenics_bridge.fem.supports import Support, fixed, flat_normal, prescribed, roller
 from fenics_bridge.forms import redirect_compiler_lines, repair_cache
 from fenics_bridge.mesh.background import background_arrays, background_mesh, original_cells
+from fenics_bridge.mesh.beside import tags_beside
 from fenics_bridge.mesh.box_mesh import BODY, box_mesh
 from fenics_bridge.mesh.graded import graded_tags
 from fenics_bridge.mesh.meshes import read_mesh
@@ -48,6 +49,7 @@ __all__ = [
     "k0_layered_stress", "k0_stress", "log_spiral", "log_spiral_safety", "log_spiral_seismic", "name_tags", "names_of", "nodal_average",
     "original_cells", "particle_safety", "prescribed", "print_step", "pseudo_static", "read_mesh", "reduced_strength", "roller",
     "seepage_forces", "slope_mesh", "soil_mesh", "solve_elastic", "solve_nearly_incompressible",
+    "tags_beside",
 ]
 # fmt: on
 

@@ -265,7 +265,7 @@ def read_consolidation_site(
     changes = changes_of(rows, [key for key in CHANGES if key not in ("excavate", "install", "remove")])
     if changes:
         say(f"{path}: this study leaves out {changes}")
-    site = site_of(effective_laws(table), path, comm, cell_size)
+    site = site_of(effective_laws(table), path, comm, cell_size, interfaces=True)
     mesh = part_of_mesh((site.domain, site.cell_tags, site.facet_tags), soils)
     for name in pressures or {}:
         if name not in mesh[2].names:

@@ -42,6 +42,7 @@ import mpm_core as mpm
 
 from .checks import say
 from .site_doubts import warn_of_depth
+from .site_interfaces import fractions_of, in_stages, split_beside, weakened
 from .site_keys import changes_of, member_of, part_of, read_site_table, require_push
 from .site_laws import is_number, law_at, law_keys, located, unit_doubt, unit_weight_of
 from .site_supports import support_of, supports_of
@@ -207,8 +208,18 @@ def warn_of_members(table: dict[str, Any], path: Path) -> None:
             "and consolidation have them")  # fmt: skip
 
 
-def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = None) -> Site:
-    """The site that a table describes, as `read_site` has it from a file; path: of the file, for its mesh and messages."""
+def site_of(
+    table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = None, interfaces: bool | None = None
+) -> Site:
+    """The site that a table describes, as `read_site` has it from a file.
+
+    Args:
+        table: of the site.
+        path: of the file, for its mesh and messages.
+        comm: the ranks.
+        cell_size: [m], instead of the one in the file.
+        interfaces: whether soil beside walls has the strength of their interfaces from the beginning; None: while they are there.
+    """
     axisymmetric = table.get("axisymmetric", False)
     if not isinstance(axisymmetric, bool):
         raise mpm.InputError(f"{path}: axisymmetric is {axisymmetric!r}, expected true or false")
@@ -237,10 +248,16 @@ def site_of(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = N
     }
     members = {name: member_of(given, f"{path}: members.{name}") for name, given in table.get("members", {}).items()}
     _require_columns(members, path)
-    rows = table.get("stages", [])
+    rows, names = table.get("stages", []), {} if interfaces is False else fractions_of(table.get("members", {}), path)
+    cell_tags, beside = split_beside(domain, cell_tags, laws, members, names)
+    at_once = interfaces or (interfaces is None and not rows)
+    laws = weakened(laws, beside, at_once)
     site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, supports_of(table, path, domain, facet_tags), [],
                 list(others.values()), axisymmetric, rows, members)  # fmt: skip
     site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(rows)]
+    if beside.walls and not at_once:
+        site.stages, further = in_stages(site.stages, laws, beside, lambda soil: site.tags_of([soil]))
+        site.further_laws += further
     absent = [name for name in members if rows and not any(name in stage.install for stage in site.stages)]
     if absent:
         say(

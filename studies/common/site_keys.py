@@ -34,6 +34,8 @@ KEYS = {
     "stages": "tables [[stages]] of what is placed and dug away",
 }
 """What stands at the top of a site's file, and what it is"""
+INTERFACE = "interface_strength"
+"""Key of a beam: the strength of friction and adhesion between it and the soil, over the strength of the soil"""
 CURVES = {"van_genuchten": water.VanGenuchten, "gardner": water.Gardner, "free_surface": water.FreeSurface,
           "tabulated": water.Tabulated}  # fmt: skip
 FLOW = ("conductivity", "dip", "porosity", "compressibility", *CURVES)
@@ -136,7 +138,7 @@ def _require_member(given: Any, where: str) -> None:
     if not isinstance(kind, str) or kind not in MEMBERS:
         raise mpm.InputError(f"{where}: kind is {kind!r}, expected one of {', '.join(map(repr, MEMBERS))}")
     arguments = [name for name in signature(MEMBERS[kind]).parameters if name not in ("start", "end", "points")]
-    _require_known(given, ("kind", "points", *arguments), where)
+    _require_known(given, ("kind", "points", *arguments, *([INTERFACE] if kind == "beam" else [])), where)
 
 
 def member_of(given: Mapping[str, Any], where: str) -> mpm.Member:
@@ -145,7 +147,7 @@ def member_of(given: Mapping[str, Any], where: str) -> mpm.Member:
     Raises:
         InputError: a value is missing or out of range.
     """
-    arguments = {key: value for key, value in given.items() if key != "kind"}
+    arguments = {key: value for key, value in given.items() if key not in ("kind", INTERFACE)}
     if "points" not in arguments:
         raise mpm.InputError(f"{where} has no points, expected those of its line, such as [[0, 0], [0, -5]]")
     try:

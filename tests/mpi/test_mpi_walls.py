@@ -45,3 +45,19 @@ def test_a_wall_beside_the_mesh_is_refused_on_all_ranks():
         message = str(error)
     assert "walls: the line 0 goes through a cell at (7.9, 3." in message
     assert len(set(COMM.allgather(message))) == 1
+
+
+def beside_walls(comm):
+    """Tags, names and area of the cells beside two walls that meet, by tag."""
+    domain, cell_tags, _ = bridge.box_mesh(comm, (8.0, 4.0), (32, 16))
+    tags, before = bridge.tags_beside(domain, cell_tags, LINE)
+    tags, second = bridge.tags_beside(domain, tags, [(4.0, 2.0), (4.0, 0.0)])
+    owned = tags.indices < domain.topology.index_map(2).size_local
+    counts = comm.allreduce(np.bincount(tags.values[owned], minlength=8))
+    return before, second, bridge.names_of(tags), counts.tolist()
+
+
+def test_the_cells_beside_walls_are_the_same_on_all_numbers_of_ranks():
+    together = beside_walls(COMM)
+    assert together == beside_walls(MPI.COMM_SELF)
+    assert len(together[0]) == 1 and len(together[1]) == 2 and min(count for count in together[3] if count) < 10

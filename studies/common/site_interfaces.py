@@ -1,0 +1,119 @@
+"""Soil that slides along the walls of a site: cells beside them whose strength is a fraction of that of their soil."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+
+from .site_keys import INTERFACE
+from .site_laws import is_number
+
+WITHOUT_MEMORY = (mpm.LinearElastic, mpm.MohrCoulomb, mpm.ViscoplasticMohrCoulomb, mpm.DruckerPrager)
+"""Laws that may change in a stage without losing what the soil has gone through"""
+
+
+@dataclass
+class Interfaces:
+    """Cells beside walls.
+
+    fractions: strength of each wall's interface over that of the soil; walls: the walls beside the cells of each tag
+    """
+
+    fractions: dict[str, float] = field(default_factory=dict)
+    walls: dict[int, tuple[str, ...]] = field(default_factory=dict)
+
+    def law(self, tag: int, law: Any, there: Any) -> Any:
+        """The law of a tag's cells beside those of its walls that are there, which has the strength of the weakest interface."""
+        fractions = [self.fractions[wall] for wall in self.walls.get(tag, ()) if wall in there]
+        return bridge.reduced_strength(law, 1 / min(fractions)) if fractions and min(fractions) < 1 else law
+
+
+def fractions_of(tables: Mapping[str, Any], path: Path) -> dict[str, float]:
+    """The interface strengths of a site's members by name; of those that name one.
+
+    Raises:
+        InputError: a fraction that is not above 0 and at most 1.
+    """
+    found = {}
+    for name, table in tables.items():
+        if INTERFACE not in table:
+            continue
+        where, value = f"{path}: members.{name}", table[INTERFACE]
+        if not is_number(value) or not 0 < value <= 1:
+            raise mpm.InputError(f"{where}: {INTERFACE} is {value!r}, expected a number above 0 and at most 1")
+        found[name] = float(value)
+    return found
+
+
+def split_beside(
+    domain: Any, cell_tags: Any, laws: dict[int, Any], members: Mapping[str, mpm.Member], fractions: dict[str, float]
+) -> tuple[Any, Interfaces]:
+    """Give the cells beside walls tags of their own, which have the laws of their soils until the walls are there. Collective.
+
+    Args:
+        domain: the mesh; cell_tags: its tags.
+        laws: by cell tag; those of the new tags are added.
+        members: by name; fractions: interface strengths of walls among them.
+
+    Returns:
+        The new cell tags, and what is beside walls.
+    """
+    beside = Interfaces(fractions)
+    for wall in fractions:
+        cell_tags, before = bridge.tags_beside(domain, cell_tags, members[wall])
+        for new, old in before.items():
+            if old in laws:
+                laws[new] = laws[old]
+                beside.walls[new] = (*beside.walls.get(old, ()), wall)
+    return cell_tags, beside
+
+
+def in_stages(
+    stages: list[bridge.Stage], laws: dict[int, Any], beside: Interfaces, tags_of: Any
+) -> tuple[list[bridge.Stage], list[Any]]:
+    """Let interfaces have their strength from the stage on that installs their wall, and lose it when it is taken away.
+
+    Soils whose laws remember what they have gone through have that of the interface from the beginning, as `weakened` gives it.
+
+    Args:
+        stages: of the site.
+        laws: by cell tag, those of tags beside walls without memory as the soils have them.
+        beside: cells beside walls.
+        tags_of: function of the name of a soil that gives its tags.
+
+    Returns:
+        The stages, and the laws that come in by them.
+    """
+    there: set[str] = set()
+    full, acting = dict(laws), dict(laws)
+    changed, further = [], []
+    for stage in stages:
+        there = there.difference(stage.remove).union(stage.install)
+        given = {tag: law for soil, law in stage.law.items() for tag in tags_of(soil)}
+        full |= given
+        for tag in beside.walls:
+            law = beside.law(tag, full[tag], there)
+            changes = tag in given or law != acting[tag]
+            if changes and isinstance(full[tag], WITHOUT_MEMORY):
+                given[tag] = law
+                further.append(law)
+        acting |= given
+        changed.append(replace(stage, law=given) if given else stage)
+    return changed, further
+
+
+def weakened(laws: dict[int, Any], beside: Interfaces, all_laws: bool) -> dict[int, Any]:
+    """The laws with the strength of all interfaces.
+
+    Args:
+        laws: by cell tag.
+        beside: cells beside walls.
+        all_laws: whether laws without memory are among those that are weakened, as where all walls are there from the beginning.
+    """
+    chosen = [tag for tag in beside.walls if all_laws or not isinstance(laws[tag], WITHOUT_MEMORY)]
+    return laws | {tag: beside.law(tag, laws[tag], beside.fractions) for tag in chosen}
