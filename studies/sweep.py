@@ -1,16 +1,18 @@
-"""A study many times with other parameters: sensitivity, all combinations, or samples of distributions.
+"""A study many times with other parameters: sensitivity, all combinations, samples of distributions, back-analysis.
 
 Each parameter of --vary is an option of the study or a key of its site file, such as soils.clay.cohesion. It has a list of values
 (20,25,30), equal steps (20:30:5, five values from 20 to 30) or a distribution (normal:MEAN:SD, lognormal:MEAN:SD, both also with
-:LOW:HIGH for limits, uniform:LOW:HIGH, triangular:LOW:MODE:HIGH). Lists give all combinations; distributions need --samples. The
-study and its options come last:
+:LOW:HIGH for limits, uniform:LOW:HIGH, triangular:LOW:MODE:HIGH). Lists give all combinations; distributions need --samples. With
+--find in place of --vary, the value of a parameter is found for which a result is that of --target. The study and its options come last:
 
     sweep --vary cohesion=2e3:6e3:5 --vary friction-angle=20,25,30 safety --meshes 1
+    sweep --find friction-angle=15:35 --target factor_of_safety=1 safety --meshes 1
     sweep --vary soils.core.cohesion=lognormal:10e3:3e3 --samples 200 --limit factor_of_safety=1 safety --site dam.toml
 """
 
 from __future__ import annotations
 
+import math
 import sys
 from argparse import REMAINDER, ArgumentParser, Namespace
 from collections.abc import Sequence
@@ -18,6 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from common.checks import check_effect
 from common.figures import Pictures
 from common.interrupt import Interrupt
 from common.options import add_count, add_flag, check, study_parser
@@ -28,19 +31,13 @@ from common.ranks import run_study
 from common.results import open_results
 from common.site_laws import law_units
 from common.summary import write_summary
+from common.sweep_find import find as find_value
+from common.sweep_find import wanted_of
 from common.sweep_maps import hazard_maps
-from common.sweep_plan import Row, Variable, correlation_of, plan, variable_of
-from common.sweep_plots import label, picture_of
-from common.sweep_results import (
-    drawn_results,
-    ended_before,
-    probability_below,
-    rank_correlations,
-    statistics,
-    values_of,
-    write_table,
-)
-from common.sweep_runs import Run, Study, carry_out, log_of, processors, require_names, runs_of, study_of, take_results
+from common.sweep_plan import Variable, correlation_of, plan, variable_of
+from common.sweep_plots import picture_of
+from common.sweep_results import drawn_results, ended_before, label, said, summarise, write_table
+from common.sweep_runs import Run, Study, carry_out, processors, require_names, runs_of, study_of, take_results
 from mpi4py import MPI
 from talus import find
 
@@ -72,6 +69,10 @@ def parser() -> ArgumentParser:
                    "may be repeated (default: the first ones that differ between runs)")  # fmt: skip
     p.add_argument("--limit", action="append", default=[], metavar="NAME=X", help="a limit of a result, of which the probability of being "
                    "below it is found; may be repeated")  # fmt: skip
+    p.add_argument("--find", default=None, metavar="NAME=LOW:HIGH", help="instead of --vary: find the value of a parameter between two "
+                   "others for which --target holds")  # fmt: skip
+    p.add_argument("--target", default=None, metavar="NAME=X", help="the value of a result that --find looks for, such as "
+                   "factor_of_safety=1")  # fmt: skip
     add_count(p, "--jobs", None, "runs at once (default: processors over --run-ranks)")
     add_count(p, "--run-ranks", 1, "MPI ranks of each run")
     add_flag(p, "--resume", "go on with the sweep in the folder of --output: runs that gave results are kept; with more --samples, "
@@ -93,7 +94,18 @@ def parse(arguments: Sequence[str] | None = None) -> Namespace:
         "the sweep starts its runs itself; expected one rank, and --run-ranks N for N ranks of each run",
     )
     check(p, bool(a.run), "no study is named, expected its name and options at the end")
-    check(p, bool(a.vary), "--vary is not given, expected a parameter and its values, such as cohesion=1e3,2e3")
+    check(
+        p, bool(a.vary or a.find), "--vary is not given, expected a parameter and its values, such as cohesion=1e3,2e3"
+    )
+    check(p, not (a.vary and a.find), "--find is given, expected no --vary with it")
+    check(p, bool(a.find) == bool(a.target), "--find and --target are expected together")
+    check_effect(
+        p,
+        a,
+        not a.find,
+        ["--samples", "--correlate", "--one-at-a-time", "--result", "--limit", "--resume"],
+        "no --find",
+    )
     for name in ("--output", "--overwrite"):
         stray = any(word.split("=")[0] == name for word in a.run[1:])
         check(
@@ -177,67 +189,34 @@ def refusal(run: Run, named: Sequence[str]) -> list[str]:
     ]
 
 
-# --- 3. Results ------------------------------------------------------------------------------------------------------
+# --- 3. Sweep and back-analysis ------------------------------------------------------------------------------------------------------
 
 
-def summarise(
-    runs: list[Run], variables: Sequence[Variable], shown: Sequence[str], limits: dict[str, float], alone: bool
-) -> dict[str, Any]:
-    """Statistics of the results, by name."""
-    random = any(one.quantile is not None for one in variables) and not alone
-    results: dict[str, Any] = {"statistics": {name: statistics(values_of(runs, name)) for name in shown}}
-    if limits and random:
-        results["probabilities"] = {
-            name: probability_below(values_of(runs, name), limit) for name, limit in limits.items()
-        }
-    if random:
-        found = {name: rank_correlations(runs, [one.name for one in variables], name) for name in shown}
-        results["rank_correlations"] = {name: row for name, row in found.items() if row}
-    return results
-
-
-def said(runs: list[Run], results: dict[str, Any]) -> str:
-    """What is printed at the end."""
-    failed = [run for run in runs if run.code is not None and not run.results]
-    lines = [f"{sum(bool(run.results) for run in runs)} of {len(runs)} runs have results"]
-    lines += [f"run {run.number} failed: {run.reason} ({log_of(run)})" for run in failed[:3]]
-    if failed:
-        lines.append("runs without results are left out of all numbers")
-    for name, row in results["statistics"].items():
-        if row["runs"]:
-            spread = (
-                f", mean {row['mean']:.4g}, standard deviation {row['standard_deviation']:.3g}"
-                if "rank_correlations" in results
-                else ""
-            )
-            lines.append(f"{label(name)}: {row['smallest']:.4g} to {row['largest']:.4g}{spread}")
-    for name, row in results.get("probabilities", {}).items():
-        if row["runs"]:
-            lines.append(f"{label(name)} is below {row['limit']:g} in {row['runs_below']} of {row['runs']} runs, "
-                         f"{row['probability_below']:.2%} (95 % interval {row['interval_low']:.2%} to {row['interval_high']:.2%})")  # fmt: skip
-    return "\n".join(lines)
-
-
-def prepared(a: Namespace) -> tuple[Study, list[Variable], list[Row]]:
-    """The study, the parameters that vary and the values of all runs.
+def study_named(a: Namespace) -> Study:
+    """The study that the words at the end name, with its options.
 
     Raises:
-        InputError: an option that is not possible, or a parameter that the study or its site does not have.
+        InputError: there is none of that name, or it does not show its help.
     """
     script = find.study_path(a.run[0])
     if script is None:
         raise InputError(f"there is no study {a.run[0]!r}, expected one of {', '.join(find.studies())}")
-    variables = [variable_of(word) for word in a.vary]
-    rows = plan(variables, a.samples, dict(map(correlation_of, a.correlate)), a.seed, a.one_at_a_time)
     study = study_of(script, a.run[1:], a.run_ranks)
-    require_names(study, [one.name for one in variables])
-    return study, variables, rows
+    a.run = [a.run[0], *study.words]
+    return study
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    a = parse(arguments)
-    limits, (study, variables, rows) = limits_of(a.limit), prepared(a)
-    a.run, names, named = [a.run[0], *study.words], [one.name for one in variables], [*a.result, *limits]
+def jobs(a: Namespace) -> int:
+    """Runs at once."""
+    return a.jobs or max(1, processors() // a.run_ranks)
+
+
+def swept(a: Namespace, study: Study) -> int:
+    """A sweep of parameters; returns its exit code."""
+    variables, limits = [variable_of(word) for word in a.vary], limits_of(a.limit)
+    rows = plan(variables, a.samples, dict(map(correlation_of, a.correlate)), a.seed, a.one_at_a_time)
+    names, named = [one.name for one in variables], [*a.result, *limits]
+    require_names(study, names)
     kept = ended_before(a.output, rows, names) if a.resume else {}
     folder = open_results(a, MPI.COMM_SELF, adds=a.resume)
     runs = runs_of(study, rows, folder)
@@ -245,26 +224,85 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if run.number in kept:
             run.code, run.seconds = kept[run.number]
             take_results(run)
-    print(
-        f"{len(runs)} runs of {study.script.stem}" + (f", of which {len(kept)} are there" if kept else ""), flush=True
-    )
-    interrupted = make_all(runs, study, folder, names, named, a.jobs or max(1, processors() // a.run_ranks))
-    there = sum(bool(run.results) for run in runs)
-    shown = drawn_results(runs, named) if there else []
+    there = f", of which {len(kept)} are there" if kept else ""
+    print(f"{len(runs)} runs of {study.script.stem}{there}", flush=True)
+    interrupted = make_all(runs, study, folder, names, named, jobs(a))
+    shown = drawn_results(runs, named) if any(run.results for run in runs) else []
     results = summarise(runs, variables, shown, limits, a.one_at_a_time)
-    labels = {name: _with_unit(name, {**law_units(), **study.units}) for name in names}
-    pictures: Pictures = {
-        path.stem: partial(picture_of(runs, variables, name, labels, a.one_at_a_time, limits.get(name)), path)
-        for name in shown
-        if (path := folder / f"sweep_{name.replace('.', '_')}.png")
-    }
-    pictures = {**pictures, **hazard_maps(runs, folder)}
-    table = [{"run": run.number, **run.values, **{name: run.results.get(name) for name in shown}} for run in runs]
-    summary = {"study": study.script.stem, "runs": len(runs), "runs_with_results": there, **results, "table": table}
     if interrupted:
-        summary["stopped_because"] = f"it was interrupted; --resume --output {folder} goes on with it"
-    code = write_summary(folder, a, summary, MPI.COMM_SELF, Page(), pictures, said(runs, results))
-    return code or int(there < len(runs))
+        results["stopped_because"] = f"it was interrupted; --resume --output {folder} goes on with it"
+    labels = {name: _with_unit(name, {**law_units(), **study.units}) for name in names}
+    marks = {name: ("limit", limit) for name, limit in limits.items()}
+    draw = {name: picture_of(runs, variables, name, labels, a.one_at_a_time, marks.get(name)) for name in shown}
+    return finish(a, folder, study, runs, results, draw, said(runs, results), hazard_maps(runs, folder))
+
+
+def back_analysis(a: Namespace, study: Study) -> int:
+    """The value of a parameter for which a result has a given value; returns the exit code."""
+    wanted = wanted_of(a.find, a.target)
+    require_names(study, [wanted.name])
+    folder, runs, interrupted = open_results(a, MPI.COMM_SELF), [], []
+
+    def results_at(values: list[float]) -> list[float]:
+        new = runs_of(study, [{wanted.name: value} for value in values], folder, len(runs) + 1)
+        runs.extend(new)
+        if make_all(runs, study, folder, [wanted.name], [wanted.result], jobs(a)):
+            interrupted.append("it was interrupted")
+        return [float(run.results.get(wanted.result, math.nan)) for run in new]
+
+    found = find_value(wanted, results_at)
+    label_of = _with_unit(wanted.name, {**law_units(), **study.units})
+    reason = "".join(interrupted) or found.reason
+    results: dict[str, Any] = {
+        "parameter": wanted.name,
+        "value": found.value,
+        wanted.result: found.result,
+        "target": wanted.target,
+    }
+    if reason:
+        results["stopped_because"] = reason
+    runs.sort(key=lambda run: run.values[wanted.name])
+    draw = picture_of(
+        runs, [Variable(wanted.name)], wanted.result, {wanted.name: label_of}, False, ("target", wanted.target)
+    )
+    text = f"{label_of} of {found.value:.4g}: {label(wanted.result)} {found.result:.4g}, after {len(runs)} runs"
+    return finish(a, folder, study, runs, results, {wanted.result: draw}, text, {})
+
+
+def finish(
+    a: Namespace,
+    folder: Path,
+    study: Study,
+    runs: list[Run],
+    results: dict[str, Any],
+    draw: dict[str, Any],
+    text: str,
+    more: Pictures,
+) -> int:
+    """Write summary and pictures; returns the exit code.
+
+    Args:
+        a: options.
+        folder: of the results.
+        study: that ran.
+        runs: all of them.
+        results: of the sweep.
+        draw: functions of a path that draw a result, by its name.
+        text: what is printed.
+        more: further pictures.
+    """
+    paths = {name: folder / f"sweep_{name.replace('.', '_')}.png" for name in draw}
+    pictures = {path.stem: partial(draw[name], path) for name, path in paths.items()} | dict(more)
+    there = sum(bool(run.results) for run in runs)
+    table = [{"run": run.number, **run.values, **{name: run.results.get(name) for name in draw}} for run in runs]
+    summary = {"study": study.script.stem, "runs": len(runs), "runs_with_results": there, **results, "table": table}
+    return write_summary(folder, a, summary, MPI.COMM_SELF, Page(), pictures, text) or int(there < len(runs))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    a = parse(arguments)
+    study = study_named(a)
+    return back_analysis(a, study) if a.find else swept(a, study)
 
 
 def _with_unit(name: str, units: dict[str, str]) -> str:

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from .figures import curve_figure
-from .report import name_and_unit
 from .sweep_plan import Variable, column
-from .sweep_results import changes_alone, rank_correlations, values_of
+from .sweep_results import changes_alone, label, rank_correlations, values_of
 from .sweep_runs import Run
 
 BLUE, RED, GREY = "#1f4e79", "#b03a2e", "#808080"
@@ -20,17 +19,12 @@ COLOURS = (BLUE, RED, "#2e7d32", "#8e5ea2", "#d08c1d", "#17877d", "#5d4037", "#6
 MOST_PANELS = 4
 """Parameters over which samples are drawn, those with the largest correlation"""
 MOST_BINS = 25
-
-
-def label(name: str) -> str:
-    """A result with its unit, as an axis shows it."""
-    text, unit = name_and_unit(name)
-    return text if unit == "-" else f"{text} [{unit}]"
+Mark = tuple[str, float] | None
 
 
 def picture_of(
     runs: Sequence[Run], variables: Sequence[Variable], result: str, names: Mapping[str, str], one_at_a_time: bool,
-    limit: float | None,
+    mark: Mark,
 ) -> Callable[[Path], None]:  # fmt: skip
     """The picture of a result that suits the sweep: a tornado, a distribution with its sources, curves, or points.
 
@@ -40,20 +34,20 @@ def picture_of(
         result: name of the result.
         names: of the parameters with their units.
         one_at_a_time: whether each run changes one parameter alone.
-        limit: of the result, which is drawn; None for none.
+        mark: a value of the result that is drawn, with a word for it; None for none.
     """
     if one_at_a_time:
-        return lambda path: _tornado(path, runs, result, names, limit)
+        return lambda path: _tornado(path, runs, result, names, mark)
     if any(one.quantile is not None for one in variables):
-        return lambda path: _distribution(path, runs, variables, result, names, limit)
+        return lambda path: _distribution(path, runs, variables, result, names, mark)
     if len(variables) <= 2:
-        return lambda path: _curves(path, runs, variables, result, names, limit)
-    return lambda path: _points(path, runs, variables, result, names, limit)
+        return lambda path: _curves(path, runs, variables, result, names, mark)
+    return lambda path: _points(path, runs, variables, result, names, mark)
 
 
 def _curves(
     path: Path, runs: Sequence[Run], variables: Sequence[Variable], result: str, names: Mapping[str, str],
-    limit: float | None,
+    mark: Mark,
 ) -> None:  # fmt: skip
     """The result over the parameter with most values, a curve for each value of the other one."""
     along, *other = sorted(variables, key=lambda one: -len(one.values))
@@ -65,24 +59,24 @@ def _curves(
             text = f"{names[other[0].name]}: {_shown(group)}" if other else None
             axes.plot(x, y, "o-", color=COLOURS[k % len(COLOURS)], markersize=3, linewidth=1.1, label=text)
         axes.set(xlabel=names[along.name], ylabel=label(result))
-        _draw_limit(axes.axhline, limit)
-        if other or limit is not None:
+        _draw_mark(axes.axhline, mark)
+        if other or mark is not None:
             axes.legend(fontsize=8)
 
 
 def _points(
     path: Path, runs: Sequence[Run], variables: Sequence[Variable], result: str, names: Mapping[str, str],
-    limit: float | None,
+    mark: Mark,
 ) -> None:  # fmt: skip
     """The result of all runs over each parameter."""
     shown = variables[:MOST_PANELS]
     with curve_figure(path, (0.6 + 2.5 * len(shown), 3.0), panels=len(shown)) as panels:
-        _scatter(np.atleast_1d(panels), runs, [one.name for one in shown], result, names, limit)
+        _scatter(np.atleast_1d(panels), runs, [one.name for one in shown], result, names, mark)
 
 
 def _distribution(
     path: Path, runs: Sequence[Run], variables: Sequence[Variable], result: str, names: Mapping[str, str],
-    limit: float | None,
+    mark: Mark,
 ) -> None:  # fmt: skip
     """How often the result has which value, and the result over the parameters that it depends on most."""
     found = rank_correlations(runs, [one.name for one in variables], result)
@@ -98,15 +92,15 @@ def _distribution(
         total.grid(False)
         total.step(np.sort(values), 100 * np.arange(1, len(values) + 1) / max(len(values), 1), where="post", color=BLUE)
         total.set(ylim=(0, 100), ylabel="Fraction not above [%]")
-        _draw_limit(first.axvline, limit)
-        if limit is not None:
+        _draw_mark(first.axvline, mark)
+        if mark is not None:
             first.legend(fontsize=8)
-        _scatter(rest, runs, shown, result, names, limit, found)
+        _scatter(rest, runs, shown, result, names, mark, found)
 
 
 def _scatter(
     panels: Sequence[Any], runs: Sequence[Run], shown: Sequence[str], result: str, names: Mapping[str, str],
-    limit: float | None, correlations: Mapping[str, float] | None = None,
+    mark: Mark, correlations: Mapping[str, float] | None = None,
 ) -> None:  # fmt: skip
     y = values_of(runs, result)
     for k, (axes, name) in enumerate(zip(panels, shown)):
@@ -116,10 +110,10 @@ def _scatter(
             axes.set_ylabel(label(result))
         if correlations:
             axes.set_title(f"rank correlation {correlations[name]:.2f}", fontsize=8)
-        _draw_limit(axes.axhline, limit)
+        _draw_mark(axes.axhline, mark)
 
 
-def _tornado(path: Path, runs: Sequence[Run], result: str, names: Mapping[str, str], limit: float | None) -> None:
+def _tornado(path: Path, runs: Sequence[Run], result: str, names: Mapping[str, str], mark: Mark) -> None:
     """The change of the result by each parameter alone, those that change it most at the top."""
     rows, base = changes_alone(runs, result), float(runs[0].results.get(result, math.nan))
     parameters = list(dict.fromkeys(name for name, _, _ in rows))
@@ -134,16 +128,16 @@ def _tornado(path: Path, runs: Sequence[Run], result: str, names: Mapping[str, s
                     axes.annotate(_shown(end[1]), (end[0], k), (3 * side, 0), textcoords="offset points", fontsize=7,
                                   va="center", ha="left" if side > 0 else "right")  # fmt: skip
         axes.axvline(base, color="black", linewidth=0.8)
-        _draw_limit(axes.axvline, limit)
+        _draw_mark(axes.axvline, mark)
         axes.set_yticks(range(len(parameters)), [names[name] for name in parameters])
         axes.set_xlabel(label(result))
         axes.grid(visible=False, axis="y")
         axes.margins(x=0.2)
 
 
-def _draw_limit(line: Callable[..., Any], limit: float | None) -> None:
-    if limit is not None:
-        line(limit, color="black", linestyle="--", linewidth=0.9, label=f"limit {limit:g}")
+def _draw_mark(line: Callable[..., Any], mark: Mark) -> None:
+    if mark is not None:
+        line(mark[1], color="black", linestyle="--", linewidth=0.9, label=f"{mark[0]} {mark[1]:g}")
 
 
 def _shown(value: Any) -> str:

@@ -16,8 +16,9 @@ from scipy import stats
 from mpm_core import InputError
 
 from .files import write_text
-from .sweep_plan import Row, column
-from .sweep_runs import Run
+from .report import name_and_unit
+from .sweep_plan import Row, Variable, column
+from .sweep_runs import Run, log_of
 
 TABLE = "sweep.csv"
 """Table of all runs"""
@@ -67,6 +68,12 @@ def ended_before(folder: Path, rows: Sequence[Row], names: Sequence[str]) -> dic
         ):
             found[number] = int(row["exit_code"]), float(row["seconds"])
     return found
+
+
+def label(name: str) -> str:
+    """A result with its unit, as an axis shows it."""
+    text, unit = name_and_unit(name)
+    return text if unit == "-" else f"{text} [{unit}]"
 
 
 def drawn_results(runs: Sequence[Run], named: Sequence[str]) -> list[str]:
@@ -145,3 +152,41 @@ def changes_alone(runs: Sequence[Run], result: str) -> list[tuple[str, Any, floa
         for name, _, _ in alone
     }
     return sorted(alone, key=lambda row: most[row[0]])
+
+
+def summarise(
+    runs: list[Run], variables: Sequence[Variable], shown: Sequence[str], limits: dict[str, float], alone: bool
+) -> dict[str, Any]:
+    """Statistics of the results, by name."""
+    random = any(one.quantile is not None for one in variables) and not alone
+    results: dict[str, Any] = {"statistics": {name: statistics(values_of(runs, name)) for name in shown}}
+    if limits and random:
+        results["probabilities"] = {
+            name: probability_below(values_of(runs, name), limit) for name, limit in limits.items()
+        }
+    if random:
+        found = {name: rank_correlations(runs, [one.name for one in variables], name) for name in shown}
+        results["rank_correlations"] = {name: row for name, row in found.items() if row}
+    return results
+
+
+def said(runs: list[Run], results: dict[str, Any]) -> str:
+    """What is printed at the end."""
+    failed = [run for run in runs if run.code is not None and not run.results]
+    lines = [f"{sum(bool(run.results) for run in runs)} of {len(runs)} runs have results"]
+    lines += [f"run {run.number} failed: {run.reason} ({log_of(run)})" for run in failed[:3]]
+    if failed:
+        lines.append("runs without results are left out of all numbers")
+    for name, row in results["statistics"].items():
+        if row["runs"]:
+            spread = (
+                f", mean {row['mean']:.4g}, standard deviation {row['standard_deviation']:.3g}"
+                if "rank_correlations" in results
+                else ""
+            )
+            lines.append(f"{label(name)}: {row['smallest']:.4g} to {row['largest']:.4g}{spread}")
+    for name, row in results.get("probabilities", {}).items():
+        if row["runs"]:
+            lines.append(f"{label(name)} is below {row['limit']:g} in {row['runs_below']} of {row['runs']} runs, "
+                         f"{row['probability_below']:.2%} (95 % interval {row['interval_low']:.2%} to {row['interval_high']:.2%})")  # fmt: skip
+    return "\n".join(lines)

@@ -122,8 +122,8 @@ def require_names(study: Study, names: Sequence[str]) -> None:
             site_with(table, {key: 0.0}, site)
 
 
-def runs_of(study: Study, rows: Sequence[Row], folder: Path) -> list[Run]:
-    """The runs of all rows; those that change a site have a file of it in the folder.
+def runs_of(study: Study, rows: Sequence[Row], folder: Path, first: int = 1) -> list[Run]:
+    """The runs of all rows, numbered from `first` on; those that change a site have a file of it in the folder.
 
     Raises:
         InputError: a key that the site cannot have.
@@ -132,7 +132,7 @@ def runs_of(study: Study, rows: Sequence[Row], folder: Path) -> list[Run]:
     table = read_site_table(site) if site is not None and any("." in name for row in rows for name in row) else {}
     runs = []
     (folder / "runs").mkdir(exist_ok=True)
-    for number, row in enumerate(rows, 1):
+    for number, row in enumerate(rows, first):
         place = folder / "runs" / f"{number:0{digits}d}"
         words = [sys.executable, str(study.script), *study.words]
         if study.ranks > 1:
