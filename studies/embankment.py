@@ -127,6 +127,7 @@ def main(arguments: list[str] | None = None) -> int:
     a = parser().parse_args(arguments)
     start = perf_counter()
     site = read_site(a.site, comm, a.cell_size, needed=("stages",))
+    site.require_no_fields(a.site)
     folder = open_results(a, comm)
     degree, averaged = int(a.elements[1]), site_slides.averages(a, site.laws.values())
     nmd = averaged and degree == 1

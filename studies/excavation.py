@@ -18,6 +18,7 @@ from common.page import Page
 from common.quiet import NOT_REACHED, without_warning
 from common.ranks import run_study
 from common.results import open_results
+from common.site_field_plots import random_pictures
 from common.site_file import Site, read_site
 from common.stage_runs import add_stage_options, carry_out
 from common.summary import write_summary
@@ -115,7 +116,8 @@ def main(arguments: list[str] | None = None) -> int:
     said = "\n".join(
         COMPARED[name].format(value) if value is not None else NOT_CARRIED for name, value in compared.items()
     )
-    return write_summary(folder, a, summary, comm, Page(captions=shown), run.drawn(site.stages, folder), said)
+    drawn = {**run.drawn(site.stages, folder), **random_pictures(site, run.site.fem, folder)}
+    return write_summary(folder, a, summary, comm, Page(captions=shown), drawn, said)
 
 
 if __name__ == "__main__":

@@ -266,6 +266,7 @@ def read_consolidation_site(
     if changes:
         say(f"{path}: this study leaves out {changes}")
     site = site_of(effective_laws(table), path, comm, cell_size, interfaces=True)
+    site.require_no_fields(path)
     mesh = part_of_mesh((site.domain, site.cell_tags, site.facet_tags), soils)
     for name in pressures or {}:
         if name not in mesh[2].names:

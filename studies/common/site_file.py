@@ -42,6 +42,7 @@ import mpm_core as mpm
 
 from .checks import say
 from .site_doubts import warn_of_depth
+from .site_fields import SoilField, fields_of, values_of, varying
 from .site_interfaces import fractions_of, in_stages, split_beside, weakened
 from .site_keys import changes_of, member_of, part_of, read_site_table, require_push
 from .site_laws import is_number, law_at, law_keys, located, unit_doubt, unit_weight_of
@@ -64,6 +65,7 @@ class Site:
     domain, cell_tags, facet_tags: the whole mesh, with cells that never hold soil; soils: names, in the file's order
     laws: by cell tag; unit_weight: by soil [N/m3]; supports: of `fenics_bridge`; stages: as for `carry_out`
     further_laws: those that come in by stages; members: structural ones by name, of stages; axisymmetric: whether it is a half section; stage_rows: stages as in the file
+    random: parameters of soils that are random fields
     """
 
     domain: Any
@@ -78,6 +80,7 @@ class Site:
     axisymmetric: bool = False
     stage_rows: Sequence[dict[str, Any]] = ()
     members: dict[str, mpm.Member] = field(default_factory=dict)
+    random: Sequence[SoilField] = ()
 
     @property
     def geometry(self) -> mpm.Geometry | None:
@@ -102,6 +105,10 @@ class Site:
             geometry=self.geometry,
             **options,
         )
+        soils = np.array(list(laws or self.laws))  # in the order of the laws
+        of_point = np.repeat(soils[fem.points.material], fem.points.per_cell)
+        for name, values in values_of(self.random, fem.points.coordinates(), of_point, self.tags_of).items():
+            fem.set_parameter(name, values)
         if self.members and not self.stages:
             fem.reconfigure(members=self.members)
         return fem
@@ -131,6 +138,9 @@ class Site:
         for soil, weight in self.unit_weight.items():
             for tag in mesh.tags_of("cell", soil):
                 model.seed(density=weight / GRAVITY, per_cell=per_cell, cell_tag=tag, material=number[tag])
+        p = model.particles
+        for name, values in values_of(self.random, p.position, np.array(list(laws))[p.material], self.tags_of).items():
+            model.set_parameter(name, values)
         bridge.apply_supports(model, self.supports)
         model.set_gravity([0.0] * (mesh.dim - 1) + [-GRAVITY])
         return model
@@ -139,6 +149,13 @@ class Site:
         """All laws, those of stages last, with their strength divided by a factor; elastic soil beside others stays as it is."""
         laws = dict(enumerate([*self.laws.values(), *self.further_laws]))
         return list(bridge.reduced_strength(laws, factor).values())
+
+    def require_no_fields(self, path: Path) -> None:
+        """Raise InputError for random fields in the file of a study that has none."""
+        if self.random:
+            one = self.random[0]
+            raise mpm.InputError(f"{path}: soils.{one.soil}: {one.parameter} is a random field; the studies safety, collapse, excavation "
+                                 "and slope have them")  # fmt: skip
 
     def left_out_at_once(self) -> str:
         """A warning of what stages change beside placing soils, for a study that has all soils at once; else no text."""
@@ -226,20 +243,23 @@ def site_of(
     domain, cell_tags, facet_tags = site_mesh(table, path, comm, cell_size)
     check_soils(table, path, cell_tags)
     soils, laws, weights = table["soils"], {}, {}
+    random: list[SoilField] = []
     for soil, given in soils.items():
         where = f"{path}: soils.{soil}"
         weights[soil] = unit_weight_of(given, where)
         parameters = located(part_of(given, law_keys()), path.parent)
         heights: dict[int, float] = {}
+        fields, parameters = fields_of(soil, parameters, domain.topology.dim, where)
+        random += fields
         if not set(parameters) - {"porosity"}:
             raise mpm.InputError(f"{where} has no law, which this study needs: material, and the parameters of the law")
         if any(isinstance(value, dict) for value in parameters.values()):
             cell_tags, heights = bridge.graded_tags(
                 domain, cell_tags, soil, lambda x: x[:, -1], table.get("classes", 20)
             )
-            laws |= {tag: law_at(parameters, height, where) for tag, height in heights.items()}
+            laws |= {tag: varying(law_at(parameters, height, where), fields) for tag, height in heights.items()}
         else:
-            law = law_at(parameters, None, where)
+            law = varying(law_at(parameters, None, where), fields)
             laws |= dict.fromkeys(bridge.names_of(cell_tags).get(soil, (soil,)), law)
         say(unit_doubt(parameters, where, heights.values()))
     others = {
@@ -253,7 +273,7 @@ def site_of(
     at_once = interfaces or (interfaces is None and not rows)
     laws = weakened(laws, beside, at_once)
     site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, supports_of(table, path, domain, facet_tags), [],
-                list(others.values()), axisymmetric, rows, members)  # fmt: skip
+                list(others.values()), axisymmetric, rows, members, random)  # fmt: skip
     site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(rows)]
     if beside.walls and not at_once:
         site.stages, further = in_stages(site.stages, laws, beside, lambda soil: site.tags_of([soil]))

@@ -82,11 +82,16 @@ def _at_height(name: str, value: Any, height: float | None) -> Any:
         return value
     if height is None:
         raise ValueError(f"{name} is {value}, expected one value: only parameters of [soils] grow with depth")
-    if set(value) != {"value", "per_metre", "top"} or not all(map(is_number, value.values())):
+    if not is_profile(value):
         raise ValueError(
             f"{name} is {value}, expected {{value = , per_metre = , top = }}: it grows with depth below top [m]"
         )
     return float(value["value"] + value["per_metre"] * max(value["top"] - height, 0.0))
+
+
+def is_profile(value: dict) -> bool:
+    """Whether a table says how a parameter grows with depth."""
+    return set(value) == {"value", "per_metre", "top"} and all(map(is_number, value.values()))
 
 
 LEAST = {"young": 1e5, "cohesion": 50.0, "shear_strength": 50.0}

@@ -20,6 +20,7 @@ from .figures import Pictures
 from .page import Page
 from .quiet import NOT_REACHED, without_warning
 from .results import open_results
+from .site_field_plots import random_pictures
 from .site_file import Site, cell_size_of, read_site
 from .slope_fem import finite_elements, step_line
 from .summary import write_summary
@@ -85,15 +86,17 @@ def site_study(
     summary = {name: runs[-1].value, "failed_at": runs[-1].failed_at, **more(site),
                "failure_shown": runs[-1].failed, "meshes": rows, "curve_value": runs[-1].curve[:, 0],
                "curve_largest_displacement_m": runs[-1].curve[:, 1], "wall_seconds": perf_counter() - start}  # fmt: skip
+    drawn = {**_drawn(folder, sizes, runs, label, site, model), **random_pictures(site, model, folder)}
     said = []
     for row in rows:
         sure = "" if row["failure_shown"] else f", a lower bound only: {row['reason']}"
         cells = "mesh of the site" if row["cell_size_m"] is None else f"cells of {row['cell_size_m']:g} m"
         said.append(f"{cells}: {name.replace('_', ' ')} {row[name]:.3f}{sure}")
-    drawn, value = _drawn(folder, sizes, runs, label, site, model), label.split(" [")[0]
+    value = label.split(" [")[0]
     captions = {"mechanism": "Mechanism on the finest mesh, with the soils and, where there is water, the water table",
                 "value_displacement": f"{value} over the largest displacement on the way to failure",
-                "convergence": f"{value} over the size of the cells"}  # fmt: skip
+                "convergence": f"{value} over the size of the cells",
+                **{name: "Strength of the soils that is a random field" for name in drawn if name.startswith("random_")}}  # fmt: skip
     write_summary(folder, a, summary, comm, Page(captions=captions), drawn, "\n".join(said))
     return 0 if all(run.failed for run in runs) else UNDECIDED
 

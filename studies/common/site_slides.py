@@ -35,6 +35,7 @@ from .quiet import NOT_REACHED, without_warning
 from .results import open_results
 from .scenes import scene_of
 from .schemes import add_particles_per_cell, add_pic
+from .site_field_plots import random_pictures
 from .site_file import read_site
 from .summary import write_summary
 
@@ -185,6 +186,7 @@ def site_slide(a: Namespace) -> int:
         reason = next(step.report.reason for step in reversed(steps) if not step.converged)
         carried = max((step.value for step in steps if step.converged), default=0.0)
         raise mpm.InputError(f"{a.site}: its soils carry {carried:.1%} of their weight only: {reason}")
+    random = random_pictures(site, fem, folder) if a.pictures else {}
     model = site.particles(a.particles_per_cell, more=site.weaker_laws(a.factor))
     handover = bridge.initialise(model, fem, count_displacement=False, nmd=nmd, equilibrate=not fem.members)
     model.assign(model.particles.material + len(site.laws))
@@ -201,5 +203,5 @@ def site_slide(a: Namespace) -> int:
     movies = [particle_movie(f"strength divided by {a.factor:g}", scene, result.frames)]
     said = f"strength divided by {a.factor:g}: largest displacement {metres(moved)} after {result.history['time_s'][-1]:.3g} s"
     page, pictures = Page(movies=movies, captions=CAPTIONS), slide_pictures(a, result, scene, folder)
-    code = write_summary(folder, a, summary, comm, page, pictures, said)
+    code = write_summary(folder, a, summary, comm, page, {**pictures, **random}, said)
     return interrupt.exit_code or code

@@ -40,6 +40,11 @@ class Variable:
     quantile: Callable[[Any], Any] | None = None
     """Value by its probability of not being exceeded, of a parameter that is random"""
 
+    @property
+    def samples(self) -> bool:
+        """Whether its values are samples of what is random: those of a distribution, or the seeds of random fields."""
+        return self.quantile is not None or self.name.split(".")[-1] == "seed"
+
 
 def variable_of(word: str) -> Variable:
     """The variable of a word NAME=VALUES.
@@ -62,7 +67,9 @@ def variable_of(word: str) -> Variable:
         return Variable(name, tuple(map(_value, text.split(","))))
     if len(numbers) != 3 or numbers[2] != int(numbers[2] or 0) or (numbers[2] or 0) < 2:
         raise InputError(f"--vary is {word!r}, expected FROM:TO:COUNT with at least two values")
-    return Variable(name, tuple(map(_rounded, np.linspace(numbers[0], numbers[1], int(numbers[2])))))
+    values = [_rounded(value) for value in np.linspace(numbers[0], numbers[1], int(numbers[2]))]
+    whole = all(map(str.isdecimal, parts)) and all(value == int(value) for value in values)
+    return Variable(name, tuple(map(int, values) if whole else values))
 
 
 def plan(

@@ -38,7 +38,7 @@ def picture_of(
     """
     if one_at_a_time:
         return lambda path: _tornado(path, runs, result, names, mark)
-    if any(one.quantile is not None for one in variables):
+    if any(one.samples for one in variables):
         return lambda path: _distribution(path, runs, variables, result, names, mark)
     if len(variables) <= 2:
         return lambda path: _curves(path, runs, variables, result, names, mark)
@@ -79,7 +79,7 @@ def _distribution(
     mark: Mark,
 ) -> None:  # fmt: skip
     """How often the result has which value, and the result over the parameters that it depends on most."""
-    found = rank_correlations(runs, [one.name for one in variables], result)
+    found = rank_correlations(runs, [one.name for one in variables if one.quantile is not None], result)
     shown = sorted(found, key=lambda name: -abs(found[name]))[:MOST_PANELS]
     values = values_of(runs, result)
     values = values[np.isfinite(values)]

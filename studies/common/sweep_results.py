@@ -158,14 +158,15 @@ def summarise(
     runs: list[Run], variables: Sequence[Variable], shown: Sequence[str], limits: dict[str, float], alone: bool
 ) -> dict[str, Any]:
     """Statistics of the results, by name."""
-    random = any(one.quantile is not None for one in variables) and not alone
+    random = any(one.samples for one in variables) and not alone
     results: dict[str, Any] = {"statistics": {name: statistics(values_of(runs, name)) for name in shown}}
     if limits and random:
         results["probabilities"] = {
             name: probability_below(values_of(runs, name), limit) for name, limit in limits.items()
         }
     if random:
-        found = {name: rank_correlations(runs, [one.name for one in variables], name) for name in shown}
+        given = [one.name for one in variables if one.quantile is not None]
+        found = {name: rank_correlations(runs, given, name) for name in shown}
         results["rank_correlations"] = {name: row for name, row in found.items() if row}
     return results
 

@@ -34,6 +34,13 @@ def test_lists_and_steps_give_all_combinations():
 
 def test_values_of_a_list_have_their_types():
     assert variable_of("a=3,0.5,true,P2").values == (3, 0.5, True, "P2")
+    for word, values in (
+        ("seed=1:4:4", (1, 2, 3, 4)),
+        ("angle=1.0:4.0:4", (1.0, 2.0, 3.0, 4.0)),
+        ("c=1:2:3", (1.0, 1.5, 2.0)),
+    ):
+        found = variable_of(word).values
+        assert found == values and [type(one) for one in found] == [type(one) for one in values]
     assert variable_of("python-law=law.py:Sand").values == ("law.py:Sand",)
 
 

@@ -1,0 +1,63 @@
+"""Pictures of the random fields of a site."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+
+import fenics_bridge as bridge
+from fenics_bridge import compat
+from particle_player import axis_labels
+
+from .figures import Pictures, save_figure
+from .plots import WIDTH, paper_style
+from .site_file import Site
+
+LABELS = {"cohesion": ("Cohesion [kPa]", 1e-3), "friction_angle": ("Friction angle [degrees]", 1.0)}
+"""Label and scale of each parameter that may be random"""
+
+
+def random_pictures(site: Site, fem: bridge.QuasiStatic, folder: Path) -> Pictures:
+    """Pictures of the random fields of a site on a mesh, one for each parameter; none without any. Collective."""
+    comm, nodes = fem.domain.comm, compat.cell_nodes(fem.domain)[fem.points.cells]
+    tags, corners = (
+        np.array([*fem.soils, 0])[fem.points.material],
+        fem.domain.geometry.x[nodes, :2],
+    )  # the last one: not there
+    pictures: Pictures = {}
+    for name in dict.fromkeys(field.parameter for field in site.random):
+        soils = [field.soil for field in site.random if field.parameter == name]
+        values = fem.points.parameters[name].reshape(len(corners), -1).mean(axis=1)
+        found = comm.gather((corners, np.where(np.isin(tags, site.tags_of(soils)), values, np.nan)))
+        if found is not None:
+            cells, shown = (np.concatenate(parts) for parts in zip(*found))
+            pictures = {
+                **pictures,
+                f"random_{name}": partial(_save, folder / f"random_{name}.png", cells, shown, name, site.axisymmetric),
+            }
+    return pictures
+
+
+def _save(path: Path, cells: np.ndarray, values: np.ndarray, name: str, half_section: bool) -> None:
+    """Draw the values of cells (m, 3, 2) [m]; those that are NaN are left grey."""
+    label, scale = LABELS[name]
+    lower, upper = cells.min(axis=(0, 1)), cells.max(axis=(0, 1))
+    height = float(np.clip(0.9 * WIDTH * (upper[1] - lower[1]) / (upper[0] - lower[0]), 0.8, 6.0))
+    with paper_style():
+        figure = Figure(figsize=(WIDTH, height + 1.1), layout="constrained")
+        axes = figure.subplots()
+        there = np.isfinite(values)
+        axes.add_collection(PolyCollection(cells[~there], facecolors="#dddddd", edgecolors="face", linewidths=0.2))
+        drawn = PolyCollection(
+            cells[there], array=scale * values[there], cmap="viridis", edgecolors="face", linewidths=0.2
+        )
+        axes.add_collection(drawn)
+        axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), aspect="equal")
+        axes.set_xlabel(axis_labels(half_section)[0])
+        axes.set_ylabel(axis_labels(half_section)[1])
+        figure.colorbar(drawn, ax=axes, location="bottom", label=label, shrink=0.7, aspect=40)
+        save_figure(figure, path)

@@ -1,0 +1,104 @@
+"""Random fields of the soils of a site: their values at points and particles, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import study_main
+from common.site_field_plots import random_pictures
+from common.site_file import read_site
+from mpi4py import MPI
+
+import mpm_core as mpm
+
+SITE = Path(__file__).parents[3] / "meshes" / "embankment.toml"
+FIELD = "{value = 12e3, per_metre = 2e3, top = 3.0, variation = 0.4, lengths = [8.0, 1.0], seed = 3}"
+
+
+def site_in(folder, clay, more=""):
+    """The embankment with other keys of its clay."""
+    path = folder / "site.toml"
+    path.write_text(f'extends = "{SITE}"\ncell_size = 1.0\n[soils.clay]\n{clay}\n{more}\n')
+    return path
+
+
+def expected(position):
+    """Values of FIELD at positions (n, 2) [m]."""
+    field = mpm.RandomField(mean=1.0, deviation=0.4, lengths=[8.0, 1.0], seed=3, lognormal=True, correlation="markov")
+    return (12e3 + 2e3 * np.maximum(3.0 - position[:, 1], 0.0)) * field(position)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_points_and_particles_have_the_values_of_the_field(tmp_path, degree):
+    site = read_site(site_in(tmp_path, f"shear_strength = {FIELD}"), MPI.COMM_WORLD)
+    fem = site.finite_elements(degree)
+    clay = np.isin(np.array(fem.soils)[np.repeat(fem.points.material, fem.points.per_cell)], site.tags_of(["clay"]))
+    assert 0 < clay.sum() < len(clay)
+    assert fem.points.parameters["cohesion"][clay] == pytest.approx(expected(fem.points.coordinates()[clay]), rel=1e-12)
+    model = site.particles(3)
+    strength, position = model.parameter("cohesion"), model.particles.position
+    inside = position[:, 1] < 3.0
+    assert strength[inside] == pytest.approx(expected(position[inside]), rel=1e-12)
+    assert np.isnan(strength[~inside]).all()  # the cohesion of the layers does not vary
+    assert np.ptp(np.log(strength[inside])) > 1
+
+
+def test_soil_that_does_not_vary_is_the_soil_without_a_field(tmp_path):
+    factors = []
+    for clay in (
+        "shear_strength = {value = 20e3, per_metre = 0.0, variation = 0.0, lengths = [8.0, 1.0]}",
+        "shear_strength = 20e3",
+    ):
+        site = read_site(site_in(tmp_path, f"young = 4e6\n{clay}"), MPI.COMM_WORLD)
+        fem = site.finite_elements(1)
+        fem.solve(site.load())
+        assert fem.converged
+        factors.append(fem.displacement.x.array.copy())
+    assert factors[0] == pytest.approx(factors[1], rel=1e-9, abs=1e-12)
+
+
+def test_the_factor_of_safety_follows_the_field_and_its_picture_is_drawn(tmp_path):
+    weak, strong = (
+        study_main.ended("safety", tmp_path / str(factor), "--site", site_in(tmp_path, f"shear_strength = {FIELD.replace('12e3', text)}"),
+                         "--meshes", "1", "--elements", "P1", "--start", "0.3")
+        for factor, text in ((1, "12e3"), (2, "24e3"))
+    )  # fmt: skip
+    found = [float(end.stdout.split("factor of safety ")[1].split()[0]) for end in (weak, strong)]
+    assert found[1] > 1.2 * found[0]
+    assert (tmp_path / "1" / "random_cohesion.png").stat().st_size > 10_000
+
+
+def test_the_law_of_undrained_soil_keeps_its_pore_water(tmp_path):
+    clay = "undrained = true\nporosity = 0.5\nmaterial = 'mohr-coulomb'\ncohesion = {value = 3e3, variation = 0.2, lengths = [5, 1]}\nfriction_angle = 25.0\n"
+    site = read_site(site_in(tmp_path, clay + "young = 3e6\nshear_strength = 3e3"), MPI.COMM_WORLD)
+    law = site.laws[site.tags_of(["clay"])[0]]
+    assert isinstance(law, mpm.Undrained) and law.porosity == 0.5
+    assert isinstance(law.skeleton, mpm.Heterogeneous) and law.skeleton.varying == ["cohesion"]
+
+
+@pytest.mark.parametrize("clay, message", [
+    ("young = {value = 3e6, variation = 0.2, lengths = [5, 1]}", "young is a random field, expected one of cohesion"),
+    ("shear_strength = {value = 3e3, variation = 0.2}", "lengths is None, expected a correlation length along each of 2 axes"),
+    ("shear_strength = {value = 3e3, variation = 0.2, lengths = [5]}", r"lengths is \[5\], expected a correlation length"),
+    ("shear_strength = {value = 3e3, variation = 0.2, lengths = [5, 0]}", r"lengths is \[5, 0\], expected a positive number"),
+    ("shear_strength = {value = 3e3, lengths = [5, 1]}", "variation is None, expected a coefficient of variation"),
+    ("shear_strength = {value = 3e3, variation = -1, lengths = [5, 1]}", "variation is -1, expected a coefficient"),
+    ("cohesion = {value = 3e3, top = 3, variation = 0.1, lengths = [5, 1]}", "expected value, or value, per_metre and top"),
+    ("shear_strength = {value = 3e3, variation = 0.1, lengths = [5, 1], sed = 3}", "unknown key 'sed'; did you mean seed?"),
+    ("shear_strength = {value = 3e3, variation = 0.1, lengths = [5, 1], seed = 1.5}", "seed is 1.5, expected a whole number"),
+    ("shear_strength = {value = 3e3, variation = 0.1, lengths = [5, 1], lognormal = 1}", "lognormal is 1, expected true or false"),
+    ("shear_strength = {value = 3e3, variation = 0.1, lengths = [5, 1], correlation = 'white'}", "correlation is 'white'"),
+])  # fmt: skip
+def test_impossible_fields_are_refused_by_name(tmp_path, clay, message):
+    with pytest.raises(mpm.InputError, match=f"soils.clay: .*{message}"):
+        read_site(site_in(tmp_path, clay), MPI.COMM_WORLD)
+
+
+def test_studies_without_random_fields_refuse_them(tmp_path):
+    end = study_main.ended("embankment", tmp_path / "out", "--site", site_in(tmp_path, f"shear_strength = {FIELD}"))
+    assert end.returncode == 2 and "soils.clay: cohesion is a random field; the studies safety" in end.stderr
+
+
+def test_a_site_without_random_fields_has_no_picture_of_one(tmp_path):
+    site = read_site(site_in(tmp_path, ""), MPI.COMM_WORLD)
+    assert random_pictures(site, site.finite_elements(1), tmp_path) == {}
