@@ -30,7 +30,7 @@ def results(tmp_path_factory):
     """Folder and exit code of all cases at their small sizes."""
     folder = tmp_path_factory.mktemp("verification")
     command = [sys.executable, str(FOLDER / "__main__.py"), "--quick", "--output", str(folder)]
-    ran = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=1500)
     assert (folder / "verification.json").exists(), ran.stderr
     return folder, ran
 
