@@ -16,6 +16,7 @@ from dolfinx.mesh import CellType, Mesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.mesh.tagged import cell_corners, cell_volumes
 from mpm_core import Geometry
@@ -57,6 +58,29 @@ def weighted(integrand: Any, radius: Any) -> Any:
     return integrand if radius is None else radius * integrand
 
 
+def lumped_radius(domain: Mesh, geometry: Geometry | None) -> Any:
+    """The weight of integrals over a mesh by its vertices, in an axisymmetric body; None in others.
+
+    The integral of N_i r dA over a triangle of area A is A / 3 (3 r_m + r_i) / 4, with its mean radius r_m and the radius r_i of
+    the vertex: it is above zero on the axis too, and over all vertices the sum is the volume of the triangle. At the vertices
+    this function has that value beside A / 3, and no radius, which would be zero on the axis.
+    """
+    if geometry != Geometry.AXISYMMETRIC:
+        return None
+    space = compat.function_space(domain, "DG", 1)
+    weight, dofs = fem.Function(space), compat.cell_dofs(space)
+    radii = space.tabulate_dof_coordinates()[dofs, 0]
+    weight.x.array[dofs] = 0.75 * radii.mean(axis=1, keepdims=True) + 0.25 * radii
+    return weight
+
+
+def largest_radius(domain: Mesh, geometry: Geometry | None) -> float:
+    """The largest radius of an axisymmetric body [m]; 1 of others. Collective."""
+    if geometry != Geometry.AXISYMMETRIC:
+        return 1.0
+    return float(domain.comm.allreduce(float(domain.geometry.x[:, 0].max(initial=0.0)), MPI.MAX))
+
+
 def body_volumes(domain: Mesh, geometry: Geometry | None) -> NDArray[np.float64]:
     """Volumes of the cells that this rank owns (m,): [m^D], or of one radian, the integral of r dA, in an axisymmetric body."""
     volumes = cell_volumes(domain)
@@ -86,7 +110,7 @@ def require_axis_held(space: Any, geometry: Geometry, constraints: Any) -> None:
     if geometry != Geometry.AXISYMMETRIC:
         return
     domain, radial = space.mesh, space.sub(0)
-    size = domain.comm.allreduce(float(domain.geometry.x[:, 0].max(initial=0.0)), op=MPI.MAX)
+    size = largest_radius(domain, geometry)
     on_axis = fem.locate_dofs_geometrical((radial, radial.collapse()[0]), lambda x: x[0] <= 1e-12 * size)[0]
     free = np.setdiff1d(on_axis, constraints.dofs)
     problem = f"supports: {len(free)} nodes lie on the axis and may move along the radius, expected a roller there"

@@ -11,6 +11,7 @@ from dolfinx import fem
 from mpm_core.input_warnings import warn_of_rain
 from numpy.typing import NDArray
 
+from fenics_bridge.compat import facet_nodes
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.geometry import weighted
 from fenics_bridge.fem.supports import tagged_facets
@@ -114,6 +115,8 @@ class AppliedBoundary:
         tags = tag_numbers(domain.comm, self._facet_tags, condition.facet_tag, "boundary")
         domain.topology.create_connectivity(dim - 1, dim)
         facets = tagged_facets(domain.comm, self._facet_tags, condition.facet_tag, "boundary")
+        if self._radius is not None:
+            _require_off_axis(domain, facets, condition)
         dofs = fem.locate_dofs_topological(self._space, dim - 1, facets)
         if not isinstance(condition, (Flux, Rain)):
             return _Held(condition, tags, dofs)
@@ -218,7 +221,8 @@ class AppliedBoundary:
             reaction: inflow at the dofs beside the prescribed rates [m3/s], shape (m,).
 
         Returns:
-            Inflow [m3/s], per metre [m2/s] in plane flow; negative where water leaves.
+            Inflow [m3/s], per metre [m2/s] in plane flow and per radian in axial symmetry (that of the whole body is 2 pi times
+            as much); negative where water leaves.
 
         Raises:
             InputError: no facet has the tag. Raised on all ranks alike.
@@ -236,3 +240,12 @@ class AppliedBoundary:
             if held.rate is not None:
                 total += self.unit * fem.assemble_scalar(held.total)
         return comm.allreduce(float(total))
+
+
+def _require_off_axis(domain: Any, facets: NDArray[np.int32], condition: WaterBoundary) -> None:
+    """Require that no facet of a condition is on the axis of an axisymmetric body, which has no area. Collective."""
+    ends = domain.geometry.x[facet_nodes(domain, facets)][:, :, :2]
+    length = np.abs(ends[:, 1] - ends[:, 0]).max(axis=1)
+    found = bool(np.any(ends[:, :, 0].max(axis=1) <= 1e-9 * length))
+    problem = f"boundary: {condition!r} holds on the axis, where the radius is 0 and no water can cross; expected other facets"
+    agree(domain.comm, problem if found else None)

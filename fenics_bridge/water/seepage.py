@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.errors import agree, is_finite, require_mesh
+from fenics_bridge.fem.geometry import geometry_of, largest_radius, lumped_radius, radius_of, weighted
 from fenics_bridge.fem.pore_water import pressures_at
 from fenics_bridge.types import MeshTags, OfPosition
 from fenics_bridge.views import body_text
@@ -41,6 +42,7 @@ from fenics_bridge.water.soils import (
     set_by_soil,
     soils_by_tag,
 )
+from mpm_core import Geometry
 
 QUADRATURE = {1: 3, 2: 5}
 """Degree of the quadrature by the degree of the elements; permeabilities that vary within a cell have no exact one."""
@@ -70,9 +72,11 @@ class Seepage:
         loading: function of positions (n, D) [m] and time [s] that returns the vertical total stress (n,) [Pa, compression
             positive] that changes in time, such as `standing_water(...)`; it acts through the compressibility of the soils.
         gravity: of the model [m/s2], which is that of the unit weights; conductivities are those under 9.81 m/s2.
+        geometry: Geometry.AXISYMMETRIC for the half section of an axisymmetric body, whose inflows and stored water are those of
+            one radian; by default a plane section in two dimensions.
 
     Raises:
-        InputError: an unknown tag, cells without a soil, or another argument out of range. Raised on all ranks alike.
+        InputError: an unknown tag, cells without a soil, a boundary condition on the axis, or another argument out of range. Raised on all ranks alike.
     """
 
     def __init__(
@@ -88,6 +92,7 @@ class Seepage:
         options_prefix: str = "seepage_",
         loading: Callable[[NDArray[np.float64], float], ArrayLike] | None = None,
         gravity: float = LABORATORY_GRAVITY,
+        geometry: Geometry | None = None,
     ) -> None:
         require_mesh(domain)
         comm = domain.comm
@@ -95,6 +100,8 @@ class Seepage:
         given = given_water(comm, unit_weight, gravity, water_modulus)
         self.domain = domain
         """Mesh of the body"""
+        self.geometry = geometry_of(domain, geometry)
+        """Plane section, axial symmetry or a solid"""
         self.unit_weight = given.unit_weight
         """Unit weight of water [N/m3]"""
         self.facet_tags = facet_tags
@@ -114,7 +121,9 @@ class Seepage:
         self._soils, self._measures, self._cells = soils_by_tag(domain, soil, cell_tags, gravity=gravity)
         self._of_forms = as_constants(domain, self._soils)
         self._largest = max(np.linalg.eigvalsh(s.tensor(s.conductivity, self._dim)).max() for s in self._soils)
-        self._applied = AppliedBoundary(space, facet_tags, self._largest)
+        self._radius, self._lumped_radius = radius_of(domain, self.geometry), lumped_radius(domain, self.geometry)
+        self._outermost = largest_radius(domain, self.geometry)
+        self._applied = AppliedBoundary(space, facet_tags, self._largest, self._radius)
         self._steady, self._transient, self._stored, self._prefix = None, None, None, options_prefix
         self.boundary = listed(comm, boundary)
         """The boundary conditions, which may be changed between steps"""
@@ -128,7 +137,8 @@ class Seepage:
 
     def __repr__(self) -> str:
         facts = f"elements of degree {self._degree}", f"t = {self.time:g} s"
-        return body_text("Seepage", self.domain, *facts, lines=map(repr, self.boundary))
+        shown = None if self._radius is None else self.geometry
+        return body_text("Seepage", self.domain, *facts, geometry=shown, lines=map(repr, self.boundary))
 
     def _take_boundary(self) -> None:
         if self._applied.take(self.boundary):
@@ -220,7 +230,7 @@ class Seepage:
         heads = np.concatenate([values[fixed] + height[fixed], height])
         low, high = heads.min(initial=np.inf), heads.max(initial=-np.inf)
         comm = self.domain.comm
-        size = comm.allreduce(float(high), MPI.MAX) - comm.allreduce(float(low), MPI.MIN)
+        size = self._outermost * (comm.allreduce(float(high), MPI.MAX) - comm.allreduce(float(low), MPI.MIN))
         if (
             problem is self._transient
         ):  # all water, over the step: long steps, too, are to conserve it, short ones have its round-off
@@ -240,20 +250,23 @@ class Seepage:
             k = soil.conductivity / largest
             permeability = soil.retention.relative_permeability(-self._sharpness * self.unit_weight * psi)
             flow = dx(metadata={"quadrature_degree": QUADRATURE[self._degree]})
+            permeability = weighted(permeability, self._radius)
             form += permeability * ufl.inner(k * (ufl.grad(psi) + self._up), ufl.grad(test)) * flow
             lagged += permeability * ufl.inner(k * ufl.grad(trial), ufl.grad(test)) * flow
             if transient:
                 change = self._change_of_water(soil)
-                form += change / (largest * self._dt) * test * self._lumped(dx)
+                form += self._lumped(change / (largest * self._dt) * test, dx)
                 slope = ufl.derivative(change, psi, trial)
-                lagged += slope / (largest * self._dt) * test * self._lumped(dx)
+                lagged += self._lumped(slope / (largest * self._dt) * test, dx)
         form -= self._applied.inflow_form(test)
         return BoundedProblem(form, [ufl.derivative(form, psi, trial), lagged], psi, self._prefix)
 
-    def _lumped(self, dx: Any) -> Any:
-        """The measure for what is lumped: linear elements integrate it at their vertices."""
-        rule = {"quadrature_rule": "vertex", "quadrature_degree": 1}
-        return dx(metadata=rule if self._degree == 1 else {"quadrature_degree": QUADRATURE[self._degree]})
+    def _lumped(self, density: Any, dx: Any) -> Any:
+        """The integral of what is lumped: linear elements integrate it at their vertices."""
+        if self._degree == 1:
+            rule = {"quadrature_rule": "vertex", "quadrature_degree": 1}
+            return weighted(density, self._lumped_radius) * dx(metadata=rule)
+        return weighted(density, self._radius) * dx(metadata={"quadrature_degree": QUADRATURE[self._degree]})
 
     def _water_content(self, soil: PorousSoil, psi: Any, load: Any) -> Any:
         return soil.retention.saturation(-self.unit_weight * psi) * (soil.porosity + self._held(soil, psi, load))
@@ -283,7 +296,8 @@ class Seepage:
             facet_tag: number or name of the tag; None for all boundary conditions together.
 
         Returns:
-            Inflow [m3/s], per metre [m2/s] in plane flow; negative where water leaves.
+            Inflow [m3/s], per metre [m2/s] in plane flow and per radian in axial symmetry (that of the whole body is 2 pi times
+            as much); negative where water leaves.
 
         Raises:
             InputError: no facet has the tag. Raised on all ranks alike.
@@ -291,10 +305,10 @@ class Seepage:
         return self._applied.inflow(facet_tag, self._reaction)
 
     def stored_water(self) -> float:
-        """Volume of water in the body [m3], [m2] in plane flow, at atmospheric pressure. Collective."""
+        """Volume of water in the body [m3], [m2] in plane flow, per radian in axial symmetry, at atmospheric pressure. Collective."""
         if self._stored is None:
             content = [self._water_content(soil, self.pressure_head, self._load) for soil in self._of_forms]
-            self._stored = fem.form(sum(water * self._lumped(dx) for water, dx in zip(content, self._measures)))
+            self._stored = fem.form(sum(self._lumped(water, dx) for water, dx in zip(content, self._measures)))
         return self.domain.comm.allreduce(fem.assemble_scalar(self._stored))
 
     def velocity(self) -> fem.Function:

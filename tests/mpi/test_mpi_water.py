@@ -106,3 +106,24 @@ def test_flow_through_a_soil_that_not_all_ranks_have():
     flow.solve()
     velocity = bridge.evaluate_at(np.array([[0.2, 0.4], [0.45, 0.9], [3.3, 0.7], [7.9, 0.1]]), v=flow.velocity())["v"]
     assert velocity == pytest.approx(np.tile([1.0 / (0.5 / 1e-6 + 7.5 / 1e-5), 0.0], (4, 1)), rel=1e-9, abs=1e-16)
+
+
+@pytest.mark.parametrize("cells", [1, 12])
+def test_flow_to_a_well_in_axial_symmetry_does_not_depend_on_the_number_of_ranks(cells):
+    """Steady, and in time with an unsaturated zone, about the axis; some ranks may have no cell of the smallest mesh."""
+    results = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        domain, _, facet_tags = bridge.box_mesh(comm, (3.0, 2.0), (cells, cells))
+        soil = water.PorousSoil(1e-5, compressibility=1e-7, retention=water.VanGenuchten(3e-4, 2.0, residual=0.05))
+        boundary = [water.Reservoir(2, 2.0), water.Head(3, 1.0)]
+        flow = water.Seepage(domain, soil, facet_tags, boundary, geometry=bridge.Geometry.AXISYMMETRIC)
+        flow.solve()
+        results.append([1e5 * flow.inflow(2), flow.stored_water(), water.exit_gradient(flow, 3)])
+        flow.boundary[0] = water.Reservoir(2, ((0.0, 2.0), (1e3, 0.5)))
+        for _ in range(4):
+            before = flow.stored_water()
+            assert flow.advance(5e2)
+            assert flow.stored_water() - before == pytest.approx(5e2 * flow.inflow(None), abs=1e-10)
+        heads = bridge.evaluate_at(np.array([[0.0, 1.7], [1.2, 0.6]]), p=flow.pressure_head)["p"][:, 0]
+        results[-1] += [1e5 * flow.inflow(2), flow.stored_water(), *heads]
+    assert results[1] == pytest.approx(results[0], rel=1e-8, abs=1e-8)
