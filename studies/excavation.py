@@ -20,6 +20,7 @@ from common.ranks import run_study
 from common.results import open_results
 from common.site_field_plots import random_pictures
 from common.site_file import Site, read_site
+from common.stage_flow import flow_lines
 from common.stage_runs import add_stage_options, carry_out
 from common.summary import write_summary
 from mpi4py import MPI
@@ -113,11 +114,10 @@ def main(arguments: list[str] | None = None) -> int:
                 "stages_flow": "Steady flow of the water around the walls: total head, flow lines and water table",
                 "stages_strain": "The soil after each stage, by the strain accumulated since the displacements were reset",
                 "movements": "Largest movements after each stage", **captions(run.forces)}  # fmt: skip
-    said = "\n".join(
-        COMPARED[name].format(value) if value is not None else NOT_CARRIED for name, value in compared.items()
-    )
+    said = flow_lines(last.get("stage", ""), run.site.state.pore_pressure)
+    said += [COMPARED[name].format(value) if value is not None else NOT_CARRIED for name, value in compared.items()]
     drawn = {**run.drawn(site.stages, folder), **random_pictures(site, run.site.fem, folder)}
-    return write_summary(folder, a, summary, comm, Page(captions=shown), drawn, said)
+    return write_summary(folder, a, summary, comm, Page(captions=shown), drawn, "\n".join(said))
 
 
 if __name__ == "__main__":

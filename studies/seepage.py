@@ -12,6 +12,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from common.discharge import extent_of, in_words, inflow_column, inflows
 from common.field_files import FieldFiles
 from common.field_plots import save_curves
 from common.figures import Pictures
@@ -58,14 +59,16 @@ class Files(FieldFiles):
 
     def __init__(self, flow: water.Seepage, names: list[str], folder: Path) -> None:
         self._flow, self._names = flow, names
-        columns = ["time_days", *(f"inflow_{name}_m2_per_day" for name in names), "stored_water_m2"]
+        extent = extent_of(flow)
+        self._stored = f"stored_water_{extent.unit}"
+        columns = ["time_days", *(inflow_column(name, extent) for name in names), self._stored]
         super().__init__(flow.domain, folder / "seepage", folder / "history.csv", columns)
 
     def row(self) -> None:
         """Add the present inflows and stored water to the history. Collective."""
         flow = self._flow
-        inflows = {f"inflow_{name}_m2_per_day": DAY * flow.inflow(name) for name in self._names}
-        self.history.add(time_days=flow.time / DAY, stored_water_m2=flow.stored_water(), **inflows)
+        stored = {self._stored: extent_of(flow).factor * flow.stored_water()}
+        self.history.add(time_days=flow.time / DAY, **stored, **inflows(flow, self._names))
 
     def frame(self) -> None:
         """Add pressure, head and velocity to the files for ParaView. Collective."""
@@ -110,7 +113,12 @@ def follow(
 
 
 def drawn(
-    site: WaterSite, files: Files, pictures: list[FlowPicture | None], film: list[FlowPicture | None], folder: Path
+    site: WaterSite,
+    flow: water.Seepage,
+    files: Files,
+    pictures: list[FlowPicture | None],
+    film: list[FlowPicture | None],
+    folder: Path,
 ) -> Pictures:
     """Head, flow lines and water table of each frame and in a film, and the inflows over time."""
     shown = [picture for picture in pictures if picture is not None]
@@ -119,10 +127,10 @@ def drawn(
         saturation = {"saturation.png": lambda: save_flow(folder / "saturation.png", few(shown), SATURATION)}
     if len(pictures) == 1:
         return {"seepage_steady.png": lambda: save_flow(folder / "seepage_steady.png", shown), **saturation}
-    history = files.history
-    curves = {c.facet_tag: (history["time_days"], history[f"inflow_{c.facet_tag}_m2_per_day"]) for c in site.boundary}
+    history, extent = files.history, extent_of(flow)
+    curves = {c.facet_tag: (history["time_days"], history[inflow_column(c.facet_tag, extent)]) for c in site.boundary}
     moving = [picture for picture in film if picture is not None]
-    axes, limits = ("Time [days]", "Inflow [m$^2$/day]"), ((0, None), (None, None))
+    axes, limits = ("Time [days]", f"Inflow [{extent.label}]"), ((0, None), (None, None))
     return {
         "seepage_steady.png": lambda: save_flow(folder / "seepage_steady.png", shown[:1]),
         "seepage_in_time.png": lambda: save_flow(folder / "seepage_in_time.png", few(shown)),
@@ -132,17 +140,11 @@ def drawn(
     }
 
 
-def litres(inflow: float, inflows: dict[str, float]) -> float:
-    """An inflow [m2/day] in litres per metre and day; zero where it is round-off of the largest one."""
-    largest = max(abs(value) for value in inflows.values())
-    return 1000 * inflow if abs(inflow) > 1e-9 * largest else 0.0
-
-
 CAPTIONS = {
     "seepage_steady": "Steady flow: total head, flow lines, and the water table (blue)",
     "seepage_in_time": "The flow in time: total head, flow lines, and the water table (blue)",
     "saturation": "Degree of saturation, flow lines, and the water table (blue)",
-    "inflow": "Water that enters at each boundary, per metre; negative where it leaves",
+    "inflow": "Water that enters at each boundary, {}; negative where it leaves",
 }
 
 
@@ -157,7 +159,7 @@ def main(arguments: list[str] | None = None) -> int:
     flow = site.seepage(int(a.elements[1]))
     names = [c.facet_tag for c in site.boundary]
     flow.solve()
-    steady = {name: DAY * flow.inflow(name) for name in names}
+    extent, steady = extent_of(flow), inflows(flow, names)
     dry = warn_of_suction(flow, site.soils, site.cell_tags, a.site)
     pictures, stopped = [flow_picture(flow, "Steady flow at the beginning", members=site.walls)], None
     film = pictures[:1]
@@ -170,16 +172,15 @@ def main(arguments: list[str] | None = None) -> int:
                 warn_of_suction(flow, site.soils, site.cell_tags, a.site)
     summary = {
         "finished_run": stopped is None, "stopped_because": stopped,
-        **{f"steady_inflow_{name}_m2_per_day": value for name, value in steady.items()},
-        "last_time_days": flow.time / DAY, "stored_water_m2": flow.stored_water(),
+        **{f"steady_{name}": value for name, value in steady.items()},
+        "last_time_days": flow.time / DAY, f"stored_water_{extent.unit}": extent.factor * flow.stored_water(),
         "steps": len(files.history) - 1, "wall_seconds": perf_counter() - start,
     }  # fmt: skip
-    lines = [
-        f"steady inflow, {name}: {litres(value, steady):.4g} litres per metre and day" for name, value in steady.items()
-    ]
-    page = Page(captions=CAPTIONS)
+    said = zip(names, in_words(steady, extent).values())
+    lines = [f"steady inflow, {name}: {value}" for name, value in dict(said).items()]
+    page = Page(captions=CAPTIONS | {"inflow": CAPTIONS["inflow"].format(extent.words)})
     return write_summary(
-        folder, a, summary, comm, page, drawn(site, files, pictures, film, folder), said="\n".join(lines)
+        folder, a, summary, comm, page, drawn(site, flow, files, pictures, film, folder), said="\n".join(lines)
     )
 
 

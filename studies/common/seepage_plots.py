@@ -19,6 +19,7 @@ from matplotlib.tri import LinearTriInterpolator, Triangulation
 import fenics_bridge as bridge
 from fenics_bridge import water
 from fenics_bridge.water.boundary import value_at
+from particle_player import axis_labels
 
 from .animation import save_figure_film
 from .field_plots import Field, gathered
@@ -86,7 +87,8 @@ def flow_picture(
         reservoirs: to be shown: (condition, x, y), with the line of the ground below each.
         members: lines (n, 2) of structural members [m].
     """
-    head, velocity = gathered(flow.pressure_head), gathered(bridge.nodal_average(flow.velocity()))
+    head = gathered(flow.pressure_head, flow.geometry == bridge.Geometry.AXISYMMETRIC)
+    velocity = gathered(bridge.nodal_average(flow.velocity()))
     saturation = gathered(flow.saturation())
     if head is None or velocity is None or saturation is None:
         return None
@@ -191,7 +193,7 @@ def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[n
         axes.add_collection(LineCollection(picture.head.outline, colors="black", linewidths=0.8))
         axes.add_collection(LineCollection(picture.members, colors=MEMBER, linewidths=1.6, capstyle="butt"))
         axes.set_title(picture.name, loc="left", pad=14 if aspect > 1 else 3)  # above marks of the table
-    label_axes(panels, ("$x$ [m]", "$y$ [m]"))
+    label_axes(panels, axis_labels(pictures[0].head.half_section))
     if table:
         water_legend(panels[0, 0], below=aspect > 1)
     bar = figure.colorbar(ScalarMappable(norm, colours), ax=panels.ravel().tolist(), shrink=0.7, pad=0.01,

@@ -199,7 +199,8 @@ def read_site(path: Path, comm: MPI.Comm, cell_size: float | None = None, needed
     _warn_of_water(table, path)
     warn_of_pressures(table, path)
     site = site_of(table, path, comm, cell_size)
-    site.stages = with_steady_flow((site.domain, site.cell_tags, site.facet_tags), site.stages, table, path)
+    mesh = site.domain, site.cell_tags, site.facet_tags
+    site.stages = with_steady_flow(mesh, site.stages, table, path, site.geometry)
     return site
 
 
@@ -225,6 +226,14 @@ def warn_of_members(table: dict[str, Any], path: Path) -> None:
             "and consolidation have them")  # fmt: skip
 
 
+def geometry_of(table: dict[str, Any], path: Path) -> mpm.Geometry | None:
+    """Axial symmetry where the table of a site says so, None for plane strain; path: of the file, for messages."""
+    axisymmetric = table.get("axisymmetric", False)
+    if not isinstance(axisymmetric, bool):
+        raise mpm.InputError(f"{path}: axisymmetric is {axisymmetric!r}, expected true or false")
+    return mpm.Geometry.AXISYMMETRIC if axisymmetric else None
+
+
 def site_of(
     table: dict, path: Path, comm: MPI.Comm, cell_size: float | None = None, interfaces: bool | None = None
 ) -> Site:
@@ -237,9 +246,7 @@ def site_of(
         cell_size: [m], instead of the one in the file.
         interfaces: whether soil beside walls has the strength of their interfaces from the beginning; None: while they are there.
     """
-    axisymmetric = table.get("axisymmetric", False)
-    if not isinstance(axisymmetric, bool):
-        raise mpm.InputError(f"{path}: axisymmetric is {axisymmetric!r}, expected true or false")
+    axisymmetric = geometry_of(table, path) is not None
     domain, cell_tags, facet_tags = site_mesh(table, path, comm, cell_size)
     check_soils(table, path, cell_tags)
     soils, laws, weights = table["soils"], {}, {}

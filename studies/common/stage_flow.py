@@ -17,10 +17,10 @@ from fenics_bridge import water
 from fenics_bridge.water.soils import WATER_WEIGHT
 
 from .checks import say
+from .discharge import extent_of, in_words, inflows
 from .flow_doubts import warn_of_kept_flow, warn_of_low_reservoirs, warn_of_sealed_ground
 from .site_doubts import warn_of_reservoirs
 from .site_flow import boundaries_of_stage, boundary_of, wet_soils
-from .site_keys import DAY
 
 
 @dataclass
@@ -48,11 +48,24 @@ def flow_row(pressure: Any) -> dict[str, float]:
     if not isinstance(pressure, StageFlow):
         return {}
     flow = pressure.flow
-    tags = list(dict.fromkeys(one.facet_tag for one in flow.boundary))
-    inflows = {f"inflow_{tag}_m2_per_day": DAY * flow.inflow(tag) for tag in tags}
+    tags = boundaries_of(flow)
     gradients = {name: max(water.exit_gradient(flow, tag, upward) for tag in tags)
                  for name, upward in (("largest_exit_gradient", False), ("largest_upward_exit_gradient", True))}  # fmt: skip
-    return inflows | gradients
+    return inflows(flow, tags) | gradients
+
+
+def boundaries_of(flow: water.Seepage) -> list[str]:
+    """Names of the boundaries with a condition."""
+    return list(dict.fromkeys(one.facet_tag for one in flow.boundary))
+
+
+def flow_lines(stage: str, pressure: Any) -> list[str]:
+    """What enters at each boundary in the steady flow of a stage, in words; none without one. Collective."""
+    if not isinstance(pressure, StageFlow):
+        return []
+    flow, names = pressure.flow, boundaries_of(pressure.flow)
+    found = in_words(inflows(flow, names), extent_of(flow)).values()
+    return [f"inflow in the steady flow of {stage!r}, {name}: {value}" for name, value in zip(names, found)]
 
 
 def warn_of_heave(row: Mapping[str, Any], unit_weights: Sequence[float]) -> None:
@@ -69,7 +82,11 @@ def warn_of_heave(row: Mapping[str, Any], unit_weights: Sequence[float]) -> None
 
 
 def with_steady_flow(
-    mesh: tuple[Any, Any, Any], stages: Sequence[bridge.Stage], table: Mapping[str, Any], path: Path
+    mesh: tuple[Any, Any, Any],
+    stages: Sequence[bridge.Stage],
+    table: Mapping[str, Any],
+    path: Path,
+    geometry: mpm.Geometry | None = None,
 ) -> list[bridge.Stage]:
     """Stages of a site, with pore pressures of steady flow in those that ask for it by ``steady_flow = true``. Collective.
 
@@ -80,9 +97,10 @@ def with_steady_flow(
         mesh: domain, cell tags and facet tags of the site.
         stages: the stages, of which the last ones are those of the file.
         table, path: of the file.
+        geometry: of the site; None for a plane section.
 
     Raises:
-        InputError: a stage asks for it beside a water level, in an axisymmetric site, or without boundaries or soils for it.
+        InputError: a stage asks for it beside a water level, or without boundaries or soils for it.
     """
     rows = table.get("stages", [])
     if not any("steady_flow" in row for row in rows):
@@ -100,14 +118,14 @@ def with_steady_flow(
         before = members
         members = {name: one for name, one in members.items() if name not in stage.remove} | stage.install
         boundary |= boundaries_of_stage(row, where)
-        if _asks(row, where, table):
+        if _asks(row, where):
             soils = {soil: pores[soil] for soil in there if pores[soil] is not None}
             walls = {name: member for name, member in members.items() if member.impervious}
             if not boundary or not soils:
                 lacks = "no soil with a conductivity is there" if boundary else "the file has no [boundaries.NAME]"
                 raise mpm.InputError(f"{where}: steady_flow is true, but {lacks}")
             try:
-                pressure = _flow(mesh, soils, list(boundary.values()), walls, path, where)
+                pressure = _flow(mesh, soils, list(boundary.values()), walls, path, where, geometry)
                 stage, flowing = replace(stage, pore_pressure=pressure), True
                 warn_of_sealed_ground(pressure.flow, bridge.soil_mesh(*mesh, tag=there)[0], walls.values(), where)
             except (mpm.InputError, RuntimeError) as error:
@@ -120,14 +138,12 @@ def with_steady_flow(
     return result
 
 
-def _asks(row: Mapping[str, Any], where: str, table: Mapping[str, Any]) -> bool:
+def _asks(row: Mapping[str, Any], where: str) -> bool:
     given = row.get("steady_flow", False)
     if not isinstance(given, bool):
         raise mpm.InputError(f"{where}: steady_flow is {given!r}, expected true or false")
     if given and "water_level" in row:
         raise mpm.InputError(f"{where} has steady_flow and water_level, expected one of them")
-    if given and table.get("axisymmetric"):
-        raise mpm.InputError(f"{where}: steady_flow is true in an axisymmetric site, expected water_level there")
     return given
 
 
@@ -138,6 +154,7 @@ def _flow(
     walls: dict[str, Any],
     path: Path,
     where: str,
+    geometry: mpm.Geometry | None,
 ) -> StageFlow:
     """Steady flow through soils by name, by quadratic elements where no soil dries, and its pore pressures. Collective."""
     body, cells, facets = bridge.soil_mesh(*mesh, tag=list(soils), walls=walls)
@@ -148,7 +165,7 @@ def _flow(
     warn_of_reservoirs(body, acting, path)
     warn_of_low_reservoirs(body, facets, acting, where)
     dries = any(not isinstance(soil.retention, water.AlwaysSaturated) for soil in soils.values())
-    flow = water.Seepage(body, soils, facets, acting, cell_tags=cells, degree=1 if dries else 2)
+    flow = water.Seepage(body, soils, facets, acting, cell_tags=cells, degree=1 if dries else 2, geometry=geometry)
     try:
         flow.solve()
     except mpm.InputError as error:

@@ -31,7 +31,7 @@ from fenics_bridge import water
 
 from .checks import say
 from .site_doubts import warn_of_flooded_ground, warn_of_reservoirs
-from .site_file import Site, check_soils, part_of_mesh, site_mesh
+from .site_file import Site, check_soils, geometry_of, part_of_mesh, site_mesh
 from .site_flow import boundary_of, wet_soils
 from .site_keys import DAY, UNDRAINED, changes_of, member_of, read_site_table
 
@@ -41,7 +41,7 @@ class WaterSite:
     """A site of seepage as its file describes it, on its mesh.
 
     soils: {name: PorousSoil}; boundary: of `fenics_bridge.water`; varies: whether any value changes in time
-    walls: lines (n, 2) of the members that hold water back [m]
+    walls: lines (n, 2) of the members that hold water back [m]; geometry: plane section or axial symmetry
     """
 
     domain: Any
@@ -51,6 +51,7 @@ class WaterSite:
     boundary: list
     varies: bool
     walls: list[np.ndarray]
+    geometry: mpm.Geometry | None = None
 
     def seepage(self, degree: int) -> water.Seepage:
         """The flow, at rest, in elements of a degree; reservoirs that change load the soil as well. Collective."""
@@ -63,6 +64,7 @@ class WaterSite:
             cell_tags=self.cell_tags,
             degree=degree,
             loading=loading,
+            geometry=self.geometry,
         )
 
 
@@ -112,8 +114,8 @@ def read_water_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) 
     Raises:
         InputError: on all ranks, with the file, the key and what was expected.
     """
-    table = read_water_table(path, needed=("boundaries",))
-    soils = wet_soils(table, path)
+    table = read_site_table(path, needed=("boundaries",))
+    geometry, soils = geometry_of(table, path), wet_soils(table, path)
     dry = [name for name, soil in soils.items() if soil is None]
     if len(dry) == len(soils):
         raise mpm.InputError(f"{path} has no soil with a conductivity [m/s], which the flow of water needs")
@@ -131,7 +133,7 @@ def read_water_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) 
     boundary = list(boundary_of(table, path).values())
     warn_of_reservoirs(body[0], boundary, path)
     warn_of_flooded_ground(body[0], body[2], boundary, path)
-    return WaterSite(*body, wet, boundary, bool(times_of(boundary)), walls)
+    return WaterSite(*body, wet, boundary, bool(times_of(boundary)), walls, geometry)
 
 
 def read_water_table(path: Path, needed: Sequence[str]) -> dict[str, Any]:

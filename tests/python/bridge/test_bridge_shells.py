@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from dolfinx.mesh import compute_midpoints, meshtags
 from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import water
+from fenics_bridge.mesh.tagged import tag_values
 
 pytestmark = [pytest.mark.filterwarnings("ignore:the beam 'shell' " + text) for text in ("ends at", "is as stiff as")]
 
@@ -145,3 +147,24 @@ def test_shells_in_ground_that_consolidates_carry_in_the_end_what_they_do_withou
         for part in ("axial_force", "moment", "hoop_force", "hoop_moment"):
             found, expected = (getattr(one.member_forces(name), part) for one in (model, fem))
             assert np.allclose(found, expected, rtol=0, atol=1e-6 * np.abs(expected).max() + 1e-6), (name, part)
+
+
+def test_water_outside_of_a_shaft_presses_its_wall_together():
+    """N = -p R under a uniform pressure of the water in soft ground: dry within, where nothing is, and where soil was dug away."""
+    for inner in (RADIUS, 0.0):
+        domain, _, facet_tags = bridge.box_mesh(COMM, (2 * RADIUS - inner, 0.5), (8 if inner else 16, 2))
+        domain.geometry.x[:, 0] += inner
+        cells = np.arange(len(tag_values(domain, None, 2)), dtype=np.int32)
+        outside = compute_midpoints(domain, 2, cells)[:, 0] > RADIUS
+        cell_tags = meshtags(domain, 2, cells, np.where(outside, 1, 2).astype(np.int32))
+        supports = [bridge.roller(RIM, (1, 0)), bridge.roller(BOTTOM, (0, 1)), bridge.roller(TOP, (0, 1))]
+        supports += [] if inner else [bridge.roller(AXIS, (1, 0))]
+        fem = bridge.QuasiStatic(domain, mpm.LinearElastic(young=1.0, poisson=0.0), facet_tags, supports, cell_tags=cell_tags,
+                                 geometry=mpm.Geometry.AXISYMMETRIC)  # fmt: skip
+        wall = mpm.beam([(RADIUS, 0.0), (RADIUS, 0.5)], 1e8, 1e6, impervious=True)
+        water_outside = lambda x: np.where(x[:, 0] > RADIUS, PRESSURE, 0.0)
+        fem.reconfigure(off=[] if inner else [2], members={"shell": wall}, pore_pressure=water_outside)
+        fem.solve(bridge.Load())
+        forces = fem.member_forces("shell").hoop_force
+        assert np.allclose(forces, -PRESSURE * RADIUS, rtol=1e-3)  # a cell's nodes have the pressure by Simpson's rule
+        assert forces.mean() == pytest.approx(-PRESSURE * RADIUS, rel=1e-6)
