@@ -53,6 +53,18 @@ def radius_of(domain: Mesh, geometry: Geometry | None) -> Any:
     return ufl.SpatialCoordinate(domain)[0] if geometry == Geometry.AXISYMMETRIC else None
 
 
+def nodal_radius(domain: Mesh, geometry: Geometry | None) -> Any:
+    """The radius as a function that is linear in each cell, in an axisymmetric body; None in others.
+
+    Beside integrals of degree 1, for which FFCx 0.5 takes one radius, others of the same cells need this one.
+    """
+    if geometry != Geometry.AXISYMMETRIC:
+        return None
+    radius = fem.Function(compat.function_space(domain, "Lagrange", 1))
+    radius.x.array[:] = radius.function_space.tabulate_dof_coordinates()[:, 0]
+    return radius
+
+
 def weighted(integrand: Any, radius: Any) -> Any:
     """An integrand over a mesh, multiplied by the radius in axisymmetric bodies."""
     return integrand if radius is None else radius * integrand

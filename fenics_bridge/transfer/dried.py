@@ -31,7 +31,8 @@ def balance_dried_soil(
     S_e p and the weight of the water are no polynomials, so that particles, which take other points than the elements, would find
     other integrals of them. Where a cell is one of the elements', the particles keep their pressures and saturation. Their total
     stress has the elements' mean, from which the effective one follows; and what their water weighs is corrected, linearly in the
-    cell, to the elements' moments.
+    cell, to the elements' moments. In axial symmetry the mean stress of a cell does not say what its hoop stresses do, and nothing
+    is changed.
 
     Args:
         model: particles whose pore pressures and saturation are those of the elements; their masses are changed.
@@ -50,7 +51,7 @@ def balance_dried_soil(
     """
     p, mesh, water = model.particles, model.mesh, model._core.water
     _require_same_curves(model, fem, search)
-    if not (water.may_dry and fem._terms.may_dry):
+    if not (water.may_dry and fem._terms.may_dry) or model.geometry == mpm.Geometry.AXISYMMETRIC:
         return stress
     acting, lost = fem._terms.dried()
     lost.x.array[:] /= fem.water.gravity  # [kg/m3]

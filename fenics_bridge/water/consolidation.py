@@ -48,7 +48,6 @@ from fenics_bridge.water.coupled import (
 from fenics_bridge.water.initial_state import set_initial_state
 from fenics_bridge.water.motion import Motion, Newmark
 from fenics_bridge.water.projection import PressureProjection
-from fenics_bridge.water.retention import AlwaysSaturated
 from fenics_bridge.water.seepage import Seepage
 from fenics_bridge.water.soils import WATER_MODULUS, PorousSoil, given_water, soils_by_tag
 from fenics_bridge.water.time_steps import run
@@ -67,9 +66,8 @@ class Consolidation(ConsolidationResults):
         domain: mesh of the body.
         law: law of `mpm_core` for effective stresses, or laws by cell tag or name.
         soil: soil, or soils by cell tag or name; its compressibility does not count. With a retention curve it is unsaturated
-            under suction; in axisymmetric bodies it must be AlwaysSaturated. None, by cell tag, for soil without pore water,
-            such as a fill that drains at once: its stresses are total ones, and its surface on other soil is a boundary of the
-            water.
+            under suction. None, by cell tag, for soil without pore water, such as a fill that drains at once: its stresses are
+            total ones, and its surface on other soil is a boundary of the water.
         facet_tags: tags of the boundary.
         supports: boundary conditions of the displacement, from `fixed`, `roller` and `prescribed`.
         boundary: boundary conditions of the water, as for `Seepage`; a Reservoir also presses on the soil.
@@ -114,7 +112,7 @@ class Consolidation(ConsolidationResults):
         gravity: float = LABORATORY_GRAVITY,
     ) -> None:
         require_mesh(domain, connected=True)
-        agree(domain.comm, _first_mistake(element, nmd, soil, geometry, inertia))
+        agree(domain.comm, _first_mistake(element, nmd, soil, inertia))
         self.water = given_water(domain.comm, unit_weight, gravity, water_modulus, infinite=True)
         """Unit weight and modulus of the water, and the gravity of the model"""
         self.domain = domain
@@ -189,7 +187,7 @@ class Consolidation(ConsolidationResults):
             self._soils[1],
             self.water,
             self._unit,
-            self.radius,
+            self.geometry,
             degree,
             self._wet,
             self.motion,
@@ -434,15 +432,12 @@ def _largest_conductivity(soils: Any) -> float:
     return max(np.linalg.eigvalsh(soil.tensor(soil.conductivity, 3)).max() for soil in soils)
 
 
-def _first_mistake(element: Any, nmd: bool, soil: Any, geometry: Any, inertia: Any) -> str | None:
+def _first_mistake(element: Any, nmd: bool, soil: Any, inertia: Any) -> str | None:
     if not isinstance(element, Element):
         return f"element is {element!r}, expected one of {', '.join(map(str, Element))}"
     if nmd and element != Element.STABILISED:
         return f"nmd is True, expected False with element={element}: it averages strains of linear elements, Element.STABILISED"
     for one in soil.values() if isinstance(soil, dict) else [soil]:
-        retention = getattr(one, "retention", None)
-        if geometry == Geometry.AXISYMMETRIC and not isinstance(retention, (AlwaysSaturated, type(None))):
-            return f"soil has the retention curve {retention!r}, expected AlwaysSaturated in an axisymmetric body"
         if inertia is not None and getattr(one, "density", None) is None:
             return f"soil: {one!r} has no density, expected one for steps with inertia"
     if not isinstance(inertia, (Newmark, type(None))):

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from fenics_bridge import compat
 from fenics_bridge.errors import agree, is_finite, real_numbers
 from fenics_bridge.fem.active_cells import cells_there, given_stress, lonely_nodes, take_over
-from fenics_bridge.fem.fields import dilation
 from fenics_bridge.fem.supports import Constraints
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.mesh.tagged import owned_cells
@@ -109,10 +108,8 @@ def _place(model: Any, there: Any, was_there: NDArray[np.bool_]) -> None:
     new = np.flatnonzero((there.x.array > 0) & ~was_there).astype(np.int32)
     model._there.x.array[:] = there.x.array
     model._wet.x.array[:] = there.x.array * wet
-    if model.radius is None:
-        strain = dilation(ufl.split(model._body.solution)[0], None)
-        points = compat.interpolation_points(model._terms.before.function_space)
-        model._terms.before.interpolate(fem.Expression(strain, points), new)
+    placed, moved = model._terms.placed, ufl.split(model._body.solution)[0]
+    placed.interpolate(fem.Expression(moved, compat.interpolation_points(placed.function_space)), new)
     agree(
         domain.comm, None if domain.comm.allreduce(int(model._wet.x.array.sum())) else "off: no soil with water is left"
     )

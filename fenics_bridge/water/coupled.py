@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from fenics_bridge import compat
 from fenics_bridge.fem.fields import assembled, dilation
-from fenics_bridge.fem.geometry import weighted
+from fenics_bridge.fem.geometry import lumped_radius, nodal_radius, weighted
 from fenics_bridge.fem.loads import pressing
 from fenics_bridge.mesh.tagged import cell_volumes
 from fenics_bridge.types import MeshTags
@@ -33,6 +33,7 @@ from fenics_bridge.water.boundary import Reservoir, value_at
 from fenics_bridge.water.motion import Motion
 from fenics_bridge.water.retention import AlwaysSaturated
 from fenics_bridge.water.soils import PorousSoil, Water, as_constants
+from mpm_core import Geometry
 
 
 class Element(Enum):
@@ -46,7 +47,8 @@ class Element(Enum):
 
 
 UNSATURATED, LUMPED = {"quadrature_degree": 4}, {"quadrature_rule": "vertex", "quadrature_degree": 1}
-"""Integrals of soil that may dry: flow and forces; water that it stores, at the vertices, so that pressures do not oscillate."""
+"""Integrals of soil that may dry: flow and forces; water that it stores, at the vertices, so that pressures do not oscillate. What
+the hoop strain u / r presses out is of the first kind: on the axis it has no value of its own."""
 
 
 def _may_dry(soil: PorousSoil) -> bool:
@@ -63,7 +65,7 @@ class WaterTerms:
         measures: measures over their cells, likewise.
         water: the water.
         unit: unit of pressure [Pa].
-        radius: radius of an axisymmetric body, a UFL expression.
+        geometry: plane strain, axial symmetry or a solid.
         degree: degree of the quadrature.
         there: function that is 1 in cells that are there and 0 in those that are not.
         motion: Motion of the body; None without inertia.
@@ -77,31 +79,31 @@ class WaterTerms:
         measures: Sequence[Any],
         water: Water,
         unit: float,
-        radius: Any,
+        geometry: Geometry,
         degree: int,
         there: fem.Function,
         motion: Motion | None = None,
     ) -> None:
         self._domain = domain = solution.function_space.mesh
         self._up = ufl.as_vector([0.0] * (domain.geometry.dim - 1) + [1.0])
-        self._dim, self._increment, self._radius = domain.geometry.dim, increment, radius
+        self._dim, self._increment = domain.geometry.dim, increment
+        self._radius, self._lumped_radius = nodal_radius(domain, geometry), lumped_radius(domain, geometry)
         self._there, self._motion, self._soils, self._water = there, motion, as_constants(domain, soils), water
         self._unit, self._gamma, gravity = (fem.Constant(domain, v) for v in (unit, water.unit_weight, water.gravity))
         self._driving = self._up + motion.at_end / gravity if motion else self._up
         rule = {"quadrature_degree": degree}
-        curved = [_may_dry(soil) for soil in soils]
-        self._measures = [dx(metadata=UNSATURATED if dry else rule) for dx, dry in zip(measures, curved)]
-        self._storing = [dx(metadata=LUMPED if dry else rule) for dx, dry in zip(measures, curved)]
+        self._measures = [dx(metadata=UNSATURATED if _may_dry(soil) else rule) for dx, soil in zip(measures, soils)]
         self.dt = fem.Constant(domain, 1.0)
         """Length of the step [s], a constant of the forms"""
         self.projection = fem.Function(compat.function_space(domain, "DG", 0, self._dim**2))
         """Function of the pressure projection (D * D,) [m2/Pa], see `PressureProjection`"""
-        self.before = fem.Function(compat.function_space(domain, "DG", 1))
-        """Volumetric strain that soil had when it was placed [-], from which its own counts"""
+        moved = compat.degree_of(solution.function_space.sub(0))
+        self.placed = fem.Function(compat.function_space(domain, "DG", moved, self._dim))
+        """Displacement at which soil was placed [m], from which its strain counts"""
         self._u, self._p = ufl.split(solution)
         self._du, self._dp = ufl.split(increment)
-        content = lambda s: self._saturation(s, self._p) * self._pores(s)
-        self.content = fem.form(self._sum(content, self._storing))
+        content = lambda s: [(self._saturation(s, self._p), self._u - self.placed, self._pores(s))]
+        self.content = fem.form(self._held(content))
         """Form of the volume of stored water"""
 
     @property
@@ -143,7 +145,7 @@ class WaterTerms:
             if self._motion is not None:
                 acceleration = self._motion.at_end
                 forces -= self._sum(lambda s: (s.density / self._unit) * ufl.inner(acceleration, v))
-            water = self._sum(lambda s: q * self._stored(s), self._storing)
+            water = self._held(self._stored, q)
             pushed = (self._unit / self._gamma) * ufl.grad(end)
             inflow = fem.Constant(self._domain, applied.unit) * applied.inflow_form(q)
             water += self.dt * (self._flow(pushed + self._driving, q, end) - inflow)
@@ -168,10 +170,24 @@ class WaterTerms:
 
         return self._sum(density)
 
-    def _sum(self, density: Callable[[PorousSoil], Any], measures: Any = None) -> Any:
+    def _sum(self, density: Callable[[PorousSoil], Any]) -> Any:
         """Integral over the cells of all soils of a density that is a function of the soil."""
-        pairs = zip(self._soils, measures or self._measures)
+        pairs = zip(self._soils, self._measures)
         return sum(weighted(self._there * density(soil), self._radius) * dx for soil, dx in pairs)
+
+    def _held(self, parts: Callable[[PorousSoil], list[tuple[Any, Any, Any]]], test: Any = 1) -> Any:
+        """Integral over the cells of all soils of water: the sum of s (volume(u) + c) over parts (s, u, c) of each soil."""
+        total = 0
+        for soil, dx in zip(self._soils, self._measures):
+            for part, moved, volume in parts(soil):
+                part = self._there * test * part
+                if not _may_dry(soil):
+                    total += weighted(part * (self._volume(moved) + volume), self._radius) * dx
+                    continue
+                total += weighted(part * (ufl.div(moved) + volume), self._lumped_radius) * dx(metadata=LUMPED)
+                if self._radius is not None:
+                    total += part * moved[0] * dx
+        return total
 
     def _saturation(self, soil: PorousSoil, pressure: Any) -> Any:
         return soil.retention.saturation(-self._unit * pressure) if _may_dry(soil) else 1.0
@@ -189,16 +205,14 @@ class WaterTerms:
         return soil.porosity * (1 - self._saturation(soil, pressure)) * self._gamma / self._unit
 
     def _pores(self, soil: PorousSoil) -> Any:
-        """Volume of the pores at the start of the step and of what its pressure presses into them, in a volume of soil."""
-        return soil.porosity + self._volume(self._u) - self.before + self._storage(soil) * self._p
+        """Volume of the pores before soil was strained and of what its pressure presses into them, in a volume of soil."""
+        return soil.porosity + self._storage(soil) * self._p
 
-    def _stored(self, soil: PorousSoil) -> Any:
-        """Water that a volume of soil takes up in the step; small differences are taken first, for the sake of round-off."""
-        gained = self._volume(self._du) + self._storage(soil) * self._dp
-        if not _may_dry(soil):
-            return gained
+    def _stored(self, soil: PorousSoil) -> list[tuple[Any, Any, Any]]:
+        """Parts of the water that soil takes up in the step; small differences are taken first, for the sake of round-off."""
         now, before = (self._saturation(soil, p) for p in (self._p + self._dp, self._p))
-        return now * gained + (now - before) * self._pores(soil)
+        gained = [(now, self._du, self._storage(soil) * self._dp)]
+        return [*gained, (now - before, self._u - self.placed, self._pores(soil))] if _may_dry(soil) else gained
 
     def _volume(self, u: Any) -> Any:
         return dilation(u, self._radius)

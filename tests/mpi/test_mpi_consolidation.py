@@ -17,7 +17,7 @@ LEFT, RIGHT, BASE, TOP = 1, 2, 3, 4
 FULL = water.AlwaysSaturated()
 
 
-def layer(comm, element, retention=FULL, nmd=False):
+def layer(comm, element, retention=FULL, nmd=False, geometry=None):
     """A layer of Mohr-Coulomb soil, 4 m by 2 m, under a load that grows, with a seepage face at its right side."""
     domain, _, facet_tags = bridge.box_mesh(comm, (4.0, 2.0), (8, 4))
     soil = mpm.MohrCoulomb(young=10e6, poisson=0.3, cohesion=1e3, friction_angle=20.0, dilation_angle=0.0)
@@ -25,16 +25,20 @@ def layer(comm, element, retention=FULL, nmd=False):
     boundary = [water.Reservoir(TOP, ((0.0, 2.0), (1e4, 3.0))), water.SeepageFace(RIGHT)]
     load = lambda time: bridge.Load(unit_weight=20e3, pressure={TOP: 1.5 * time})
     return water.Consolidation(
-        domain, soil, water.PorousSoil(1e-7, retention=retention), facet_tags, supports, boundary, load=load, element=element, nmd=nmd
+        domain, soil, water.PorousSoil(1e-7, retention=retention), facet_tags, supports, boundary, load=load, element=element, nmd=nmd,
+        geometry=geometry,
     )  # fmt: skip
 
 
+@pytest.mark.parametrize("geometry", [None, bridge.Geometry.AXISYMMETRIC], ids=["plane", "axisymmetric"])
 @pytest.mark.parametrize("retention", [FULL, water.VanGenuchten(2e-4, 2.0)], ids=["full", "dries"])
 @pytest.mark.parametrize("element, nmd", [*((one, False) for one in water.Element), (water.Element.STABILISED, True)])
-def test_steps_with_plastic_soil_and_a_seepage_face_do_not_depend_on_the_number_of_ranks(element, nmd, retention):
+def test_steps_with_plastic_soil_and_a_seepage_face_do_not_depend_on_the_number_of_ranks(
+    element, nmd, retention, geometry
+):
     points, results = np.array([[0.5, 0.3], [2.1, 1.4], [3.9, 0.2]]), []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
-        model = layer(comm, element, retention, nmd)
+        model = layer(comm, element, retention, nmd, geometry)
         reports = model.run(3e4, 1e3, growth=2.0)
         assert reports[-1].converged and max(abs(r.water_error) for r in reports) < 1e-12
         assert comm.allreduce(float(model.points.deviatoric_strain.max(initial=0.0)), MPI.MAX) > 1e-3

@@ -11,6 +11,8 @@ from scipy.special import exp1
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import water
+from fenics_bridge.fem.fields import assembled
+from fenics_bridge.fem.geometry import lumped_radius, nodal_radius
 from mpm_core import InputError
 
 AXISYMMETRIC = bridge.Geometry.AXISYMMETRIC
@@ -215,3 +217,34 @@ def test_no_water_crosses_the_axis():
 def test_radii_are_not_below_zero():
     with pytest.raises(InputError, match="domain has the radius -1 m, expected radii from 0 on"):
         seepage(ring(-1.0, 1.0, 1.0, (3, 3)), water.PorousSoil(1e-5), [water.Head(OUTER, 1.0)])
+
+
+# --- weights of integrals --------------------------------------------------------------------------------------------
+
+
+def test_the_radius_at_the_nodes_stands_beside_integrals_of_degree_one():
+    """FFCx 0.5 takes the radius of the integral of degree 1 for all others of a form: these have that of the nodes instead."""
+    domain, _ = ring(0.0, 1.0, 1.0, (3, 3))
+    space = bridge.compat.function_space(domain, "Lagrange", 1)
+    test, given = ufl.TestFunction(space), fem.Function(space)
+    given.interpolate(lambda x: x[0] * x[1])
+    at_points, at_nodes = ufl.SpatialCoordinate(domain)[0], nodal_radius(domain, AXISYMMETRIC)
+    parts = [at_points * test * ufl.dx(metadata={"quadrature_degree": 1}),
+             at_nodes * given * test * ufl.dx(metadata={"quadrature_degree": 4})]  # fmt: skip
+    together, *alone = (assembled(fem.form(form), space).array.copy() for form in (sum(parts), *parts))
+    np.testing.assert_allclose(together, sum(alone), atol=1e-15)
+    exact = fem.assemble_scalar(fem.form(at_points * given * ufl.dx(metadata={"quadrature_degree": 4})))
+    assert alone[1].sum() == pytest.approx(exact, rel=1e-12)
+
+
+def test_lumped_weights_are_the_integrals_of_the_shape_functions():
+    domain, _ = ring(0.0, 1.0, 1.0, (3, 3))
+    test = ufl.TestFunction(bridge.compat.function_space(domain, "Lagrange", 1))
+    rule = {"quadrature_rule": "vertex", "quadrature_degree": 1}
+    forms = (
+        lumped_radius(domain, AXISYMMETRIC) * test * ufl.dx(metadata=rule),
+        ufl.SpatialCoordinate(domain)[0] * test * ufl.dx,
+    )
+    lumped, exact = (assembled(fem.form(form), test.ufl_function_space()).array.copy() for form in forms)
+    np.testing.assert_allclose(lumped, exact, rtol=1e-12)
+    assert lumped.min() > 0 and lumped.sum() == pytest.approx(0.5)
