@@ -29,6 +29,7 @@ from common.consolidation_plots import (
 )
 from common.consolidation_site import ConsolidationSite, read_consolidation_site
 from common.consolidation_stages import pressures_of
+from common.discharge import extent_of
 from common.field_files import FieldFiles
 from common.field_plots import Field, gathered
 from common.figures import Pictures
@@ -110,6 +111,8 @@ class Files(FieldFiles):
         filmed: bool,
     ) -> None:
         self._model, self._names, self.particles = model, list(site.points), particles
+        self._extent, self._half = extent_of(model), model.geometry == bridge.Geometry.AXISYMMETRIC
+        self.error_column = f"water_error_{self._extent.unit}"
         self.members = MembersOverTime(site.site.members)
         self._places = np.array(list(site.points.values())) if comm.rank == 0 else np.empty((0, 2))
         self._start = model.pressure.x.array.copy()
@@ -120,7 +123,7 @@ class Files(FieldFiles):
             *settlements,
             "largest_excess_pressure_Pa",
             "least_excess_pressure_Pa",
-            "water_error_m2",
+            self.error_column,
             *self.members.columns,
         ]
         if particles is not None:
@@ -146,8 +149,8 @@ class Files(FieldFiles):
             theirs = zip(self._names, self.particles.settlements())
             values |= {f"settlement_{name}_particles_m": value for name, value in theirs}
             values["largest_excess_pressure_particles_Pa"] = self.particles.largest_excess()
-        error = report.water_error if report else 0.0
-        self.history.add(time_days=model.time / DAY, water_error_m2=error, **values, **self.members.row(model))
+        values[self.error_column] = self._extent.factor * report.water_error if report else 0.0
+        self.history.add(time_days=model.time / DAY, **values, **self.members.row(model))
         if self._filmed:
             self.film.append(self._picture())
 
@@ -171,7 +174,7 @@ class Files(FieldFiles):
 
     def _picture(self) -> ExcessPicture | None:
         """Excess pressures and displacements now; None but on the first rank. Collective."""
-        excess, moved = self._that_is_there(gathered(self._excess)), gathered(self._model.displacement)
+        excess, moved = self._that_is_there(gathered(self._excess, self._half)), gathered(self._model.displacement)
         name, members = f"After {time_in_words(self._model.time)}", self.members.lines(self._model)
         return None if excess is None or moved is None else ExcessPicture(name, excess, moved.values, members)
 
@@ -328,7 +331,7 @@ def main(arguments: list[str] | None = None) -> int:
         **{f"settlement_{name}_m": history[f"settlement_{name}_m"][-1] for name in site.points},
         "largest_excess_pressure_Pa": history["largest_excess_pressure_Pa"].max(),
         "least_excess_pressure_Pa": history["least_excess_pressure_Pa"].min(),
-        "largest_water_error_m2": np.abs(history["water_error_m2"]).max(),
+        f"largest_{files.error_column}": np.abs(history[files.error_column]).max(),
         **files.members.largest(history), "last_time_days": model.time / DAY, "steps": len(history) - 1, "wall_seconds": perf_counter() - start,
     }  # fmt: skip
     movies = []

@@ -12,7 +12,7 @@ from fenics_bridge import water
 
 from .consolidation_site import ConsolidationSite
 from .consolidation_stages import GroundStage
-from .movie import PORE, frame_of
+from .movie import PORE, areas, frame_of
 from .scenes import scene_of
 from .slope_case import GRAVITY
 from .wet_particles import SmallMotion
@@ -111,7 +111,7 @@ class ParticleGround:
         p.set("excess_pore_pressure", excess)
         self._files.write()
         self.frames.append(frame_of(model, time, {
-            "position": p.position + moved, "volume": p.volume, "id": p.id,
+            "position": p.position + moved, "volume": areas(model, p.volume, p.position), "id": p.id,
             "displacement": np.linalg.norm(moved, axis=1), PORE: excess,
         }))  # fmt: skip
 

@@ -15,6 +15,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
+from particle_player import axis_labels
+
 from .animation import save_figure_film
 from .field_plots import Field
 from .figures import curve_figure, label_axes, panel_figure, save_figure
@@ -77,7 +79,7 @@ def _excess_figure(pictures: Sequence[ExcessPicture], scale: ExcessScale) -> Fig
         axes.set(aspect="equal", xlim=(low[0], high[0]))
         axes.set_ylim(low[1], high[1] + 0.06 * (high[1] - low[1]))
     figure.suptitle(f"Displacements magnified {scale.enlarged:g} times", fontsize=9)
-    label_axes(panels, ("$x$ [m]", "$y$ [m]"))
+    label_axes(panels, axis_labels(pictures[0].excess.half_section))
     bar = figure.colorbar(
         ScalarMappable(Normalize(*scale.limits), EXCESS.colours), ax=panels.ravel().tolist(), shrink=0.8, pad=0.01
     )

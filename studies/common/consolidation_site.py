@@ -41,14 +41,13 @@ from .checks import say
 from .site_doubts import warn_of_reservoirs
 from .site_file import CHANGES, Site, part_of_mesh, site_of
 from .site_flow import boundary_of, wet_soils
-from .site_keys import DAY, changes_of
+from .site_keys import DAY, changes_of, read_site_table
 from .slope_case import GRAVITY
 from .water_site import (
     by_law,
     corners_of,
     directions_of,
     effective_laws,
-    read_water_table,
     times_of,
     vertical_conductivity,
 )
@@ -143,7 +142,7 @@ class ConsolidationSite:
         boundary = [
             condition for condition in self.boundary if condition.facet_tag not in absent
         ]  # not of soil to come
-        flow = water.Seepage(body[0], wet, body[2], boundary, cell_tags=body[1])
+        flow = water.Seepage(body[0], wet, body[2], boundary, cell_tags=body[1], geometry=self.site.geometry)
         flow.solve()
         fem = bridge.QuasiStatic(
             domain,
@@ -155,6 +154,7 @@ class ConsolidationSite:
             as_particles=nmd,
             cell_tags=cell_tags,
             options_prefix="rest_",
+            geometry=self.site.geometry,
         )
         pressure = flow.pore_pressure(suction=True)
         self._require_members(fem)
@@ -163,7 +163,8 @@ class ConsolidationSite:
         if not fem.converged:
             raise mpm.RunError("the ground has no equilibrium under its weight and the initial pressures")
         model = water.Consolidation(domain, self.site.laws, self.soils, facet_tags, self.site.supports, self.boundary,
-                                    load=self.load, element=element, nmd=nmd, cell_tags=cell_tags)  # fmt: skip
+                                    load=self.load, element=element, nmd=nmd, cell_tags=cell_tags,
+                                    geometry=self.site.geometry)  # fmt: skip
         model.reconfigure(off=off)
         model.initialise(fem, pressure)
         return model
@@ -196,7 +197,8 @@ class ConsolidationSite:
         self._require_stages_of_particles()
         dry = [soil for soil, porous in self.soils.items() if porous is None]
         facet_tags = water.waterless_facets(*self.mesh, dry) if dry else self.mesh[2]
-        model = mpm.Model(bridge.background_mesh(*self.mesh[:2], facet_tags), list(self.site.laws.values()))
+        mesh, laws = bridge.background_mesh(*self.mesh[:2], facet_tags), list(self.site.laws.values())
+        model = mpm.Model(mesh, laws, geometry=self.site.geometry)
         there = [soil for soil in self.soils if soil not in self.stages[0].off]
         for soil in there:
             self.seed(model, soil, per_cell)
@@ -260,7 +262,7 @@ def read_consolidation_site(
     Raises:
         InputError: on all ranks, with the file, the key and what was expected.
     """
-    table = read_water_table(path, needed=("boundaries", "points"))
+    table = read_site_table(path, needed=("boundaries", "points"))
     soils, rows = wet_soils(table, path, POROUS), table.get("stages", [])
     changes = changes_of(rows, [key for key in CHANGES if key not in ("excavate", "install", "remove")])
     if changes:

@@ -30,7 +30,7 @@ PLANE = Extent(1.0, "m2", "m$^2$/day", "per metre")
 RING = Extent(2 * np.pi, "m3", "m$^3$/day", "all around the axis")
 
 
-def extent_of(flow: water.Seepage) -> Extent:
+def extent_of(flow: water.Seepage | water.Consolidation) -> Extent:
     """A metre of a plane section, or the whole body of an axisymmetric one."""
     return RING if flow.geometry == mpm.Geometry.AXISYMMETRIC else PLANE
 

@@ -72,14 +72,17 @@ def own_frame(model: mpm.Model, time: float, averaged: bool = False) -> dict[str
         pore |= model.particles.single(*WET_QUANTITIES)
         pore["pore_pressure"] = acting(model.particles.pore_pressure).astype(np.float32)
         del pore["position"]
-    area = p["volume"]
-    if model.geometry == mpm.Geometry.AXISYMMETRIC:
-        area = area / p["position"][:, 0]
+    area = areas(model, p["volume"], p["position"])
     return {
         "time": np.float64(time), "position": p["position"], "volume": area, "id": p["id"],
         "displacement": np.hypot(*p["displacement"].T), "shear_strain": p["plastic_strain"],
         "vertical_stress": p["stress"][:, 1].copy(), "speed": np.hypot(*p["velocity"].T), **pore, **_bodies(model),
     }  # fmt: skip
+
+
+def areas(model: mpm.Model, volume: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Volumes of particles (n,) as pictures have them: in the section [m2], also where they are those of one radian."""
+    return volume / position[:, 0] if model.geometry == mpm.Geometry.AXISYMMETRIC else volume
 
 
 def averaged_where_known(model: mpm.Model, values: np.ndarray) -> np.ndarray:

@@ -242,12 +242,13 @@ def _history(folder, *names):
 
 
 @pytest.mark.usefixtures("without_pictures")
-def test_loads_in_stages_settle_as_the_sum_of_olsons_ramps(tmp_path):
+@pytest.mark.parametrize("symmetry", ["", "axisymmetric = true\n"], ids=["plane", "axisymmetric"])
+def test_loads_in_stages_settle_as_the_sum_of_olsons_ramps(tmp_path, symmetry):
     """Rise, pause, rise, pause, and a part that is taken away at once; from the command line, by elements and particles."""
     import consolidation
 
     _write_layer(tmp_path)
-    (tmp_path / "layer.toml").write_text(CLAY)
+    (tmp_path / "layer.toml").write_text(symmetry + CLAY)
     rows = ((0, 0), (0.1, 20e3), (0.3, 20e3), (0.4, 50e3), (0.6, 50e3), (0.60001, 30e3))
     words = ["top=" + ",".join(f"{factor * DAYS}:{load}" for factor, load in rows)]
     arguments = ["--site", tmp_path / "layer.toml", "--days", 0.8 * DAYS, "--first-step", 1.5e-3 * DAYS, "--growth", 1.2,

@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from axisymmetric_cases import cylinder_particles
 from mpi4py import MPI
 from study_main import main
 
 import mpm_core as mpm
+from common.movie import areas
 from common.seepage_plots import flow_picture
 from common.site_file import read_site
 from common.slope_site import read_slope_site
@@ -110,6 +112,13 @@ def test_the_study_excavation_has_the_flow_of_a_whole_shaft_and_the_water_on_its
     assert (folder / "stages_flow.png").exists() and not any("m2_per_day" in key for key in last)
     # At the floor, 8 m below the groundwater, water alone presses by 9.81 (8 - some) kPa on 4 m of radius.
     assert last["wall_hoop_force_N_per_m"] < -0.8 * 9810.0 * 8.0 * 4.0
+
+
+def test_particles_of_an_axisymmetric_body_are_drawn_by_their_areas():
+    """A cylinder of 1 m by 1 m has a section of 1 m2, and half a cubic metre per radian."""
+    model = cylinder_particles(per_cell=12)
+    volume, position = model.particles.volume, model.particles.position
+    assert volume.sum() == pytest.approx(0.5) and areas(model, volume, position).sum() == pytest.approx(1.0, rel=1e-2)
 
 
 def test_studies_of_plane_slopes_refuse_an_axisymmetric_site(tmp_path):
