@@ -108,7 +108,7 @@ def test_a_mistake_is_named_by_every_study(study, old, new, words, tmp_path):
                   "that of the law\nvan_genuchten = {alpha = 1e-4, n = 1.6, residual = 0.1, air_entry = 200.0}  # 1/Pa, -, -, Pa\n",
                   ""), "soils.bank has no conductivity"),
         ("safety", ("unit_weight = 20e3  # N/m3, saturated\n", ""), "soils.bank has no unit_weight"),
-        ("seepage", ("[constants]", "axisymmetric = true\n[constants]"), "axisymmetric is True, expected false"),
+        ("drawdown", ("[constants]", "axisymmetric = true\n[constants]"), "axisymmetric is True, expected false"),
     ],
 )  # fmt: skip
 def test_what_a_study_needs_is_named(study, change, words, tmp_path):
