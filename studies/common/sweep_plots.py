@@ -93,8 +93,8 @@ def _distribution(
         total.step(np.sort(values), 100 * np.arange(1, len(values) + 1) / max(len(values), 1), where="post", color=BLUE)
         total.set(ylim=(0, 100), ylabel="Fraction not above [%]")
         _draw_mark(first.axvline, mark)
-        if mark is not None:
-            first.legend(fontsize=8)
+        if mark is not None and len(values):
+            first.set_title(f"{np.mean(values < mark[1]):.1%} of the runs below {mark[1]:g}", fontsize=8)
         _scatter(rest, runs, shown, result, names, mark, found)
 
 
