@@ -39,9 +39,9 @@ from common.sweep_plots import picture_of
 from common.sweep_results import drawn_results, ended_before, label, said, summarise, write_table
 from common.sweep_runs import Run, Study, carry_out, processors, require_names, runs_of, study_of, take_results
 from mpi4py import MPI
-from talus import find
 
 from mpm_core import InputError
+from talus import find
 
 BAD_INPUT = 2
 """Exit code of a run whose options or site are not possible"""

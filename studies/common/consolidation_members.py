@@ -23,7 +23,7 @@ from .member_results import (
     moment_column,
     write_members,
 )
-from .water_site import DAY, time_in_words
+from .water_site import time_in_words
 
 
 class MembersOverTime:

@@ -39,9 +39,10 @@ from fenics_bridge.water.boundary import value_at
 from .consolidation_stages import GroundStage, Table, pressure_table, stages_of
 from .checks import say
 from .site_doubts import warn_of_reservoirs
-from .site_file import CHANGES, Site, part_of_mesh, site_of
+from .site_file import Site, site_of
 from .site_flow import boundary_of, wet_soils
-from .site_keys import DAY, changes_of, read_site_table
+from .site_keys import CHANGES, DAY, changes_of, read_site_table
+from .site_mesh import part_of_mesh
 from .slope_case import GRAVITY
 from .water_site import (
     by_law,

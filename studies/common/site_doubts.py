@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from fenics_bridge.compat import cell_dofs, cell_nodes, facet_nodes
 from fenics_bridge.fem.supports import tagged_facets
 
 from .checks import say
+from .site_keys import STAGE_WATER, changes_of
 
 DEEPEST = 3.0
 """Depth of water over the top of a mesh, over the height of the mesh, above which a level is probably a mistake"""
@@ -130,3 +132,25 @@ def warn_of_flow(soil: water.PorousSoil, where: str) -> None:
     if soil.compressibility > LOOSEST:
         say(f"{where}: compressibility is {soil.compressibility:g} 1/Pa, of an oedometric modulus of {1 / soil.compressibility:.3g} Pa, which "
             "hardly any soil has: compressibilities are in 1/Pa, such as 1e-7 for a modulus of 10 MPa")  # fmt: skip
+
+
+def warn_of_water(table: dict[str, Any], path: Path) -> None:
+    """Warn of the water of a file for a study that has only that of stages."""
+    if "boundaries" in table and not changes_of(table.get("stages", []), STAGE_WATER):
+        say(f"{path}: the water of [boundaries] is left out here, and the soils are without pore pressure; the studies drawdown, "
+            "rain and consolidation have it, or a stage with water_level or steady_flow = true")  # fmt: skip
+
+
+def warn_of_pressures(table: dict[str, Any], path: Path) -> None:
+    """Warn of the loads of a file for a study that has none that change in time."""
+    if table.get("pressures"):
+        say(f"{path}: the loads of [pressures] are left out here; the study consolidation has them, and the studies of stages "
+            "the pressure of a stage")  # fmt: skip
+
+
+def warn_of_members(table: dict[str, Any], path: Path) -> None:
+    """Warn of the structural members of a file for a study that has none."""
+    if table.get("members"):
+        names = ", ".join(map(repr, table["members"]))
+        say(f"{path}: the structural members {names} are left out here; the studies safety, collapse, slope, excavation, embankment "
+            "and consolidation have them")  # fmt: skip

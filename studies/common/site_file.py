@@ -10,7 +10,8 @@ Example of a file:
     unit_weight = 17e3                 # N/m3
     material = "tresca"                # and the parameters of the law, named as the options of the study slope
     young = 3e6
-    cohesion = {value = 12e3, per_metre = 1.5e3, top = 3.0}    # grows with depth below the height `top`
+    cohesion = {value = 12e3, per_metre = 1.5e3, top = 3.0}    # grows with depth below the height `top`;
+                                       # a strength may be a random field, see `site_fields`
 
     [soils.fill]
     unit_weight = 19e3
@@ -41,21 +42,15 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 from .checks import say
-from .site_doubts import warn_of_depth
+from .site_doubts import warn_of_depth, warn_of_pressures, warn_of_water
 from .site_fields import SoilField, fields_of, values_of, varying
 from .site_interfaces import fractions_of, in_stages, split_beside, weakened
-from .site_keys import changes_of, member_of, part_of, read_site_table, require_push
+from .site_keys import CHANGES, STAGE_WATER, changes_of, member_of, part_of, read_site_table, require_push
 from .site_laws import is_number, law_at, law_keys, located, unit_doubt, unit_weight_of
+from .site_mesh import check_soils, geometry_of, site_mesh
 from .site_supports import support_of, supports_of
 from .slope_case import GRAVITY
 from .stage_flow import with_steady_flow
-
-AIR = ("air", "water", "empty")
-"""Groups of a mesh that hold no soil by their names"""
-CHANGES = ("excavate", "law", "unit_weight", "pressure", "support", "release", "install", "remove")
-"""What a stage may change beside soils that it places"""
-STAGE_WATER = ("water_level", "steady_flow")
-"""Keys of a stage that give it pore pressures"""
 
 
 @dataclass
@@ -196,42 +191,12 @@ def read_site(path: Path, comm: MPI.Comm, cell_size: float | None = None, needed
         InputError: on all ranks, with the file, the key and what was expected.
     """
     table = read_site_table(path, needed)
-    _warn_of_water(table, path)
+    warn_of_water(table, path)
     warn_of_pressures(table, path)
     site = site_of(table, path, comm, cell_size)
     mesh = site.domain, site.cell_tags, site.facet_tags
     site.stages = with_steady_flow(mesh, site.stages, table, path, site.geometry)
     return site
-
-
-def _warn_of_water(table: dict[str, Any], path: Path) -> None:
-    """Warn of the water of a file for a study that has only that of stages."""
-    if "boundaries" in table and not changes_of(table.get("stages", []), STAGE_WATER):
-        say(f"{path}: the water of [boundaries] is left out here, and the soils are without pore pressure; the studies drawdown, "
-            "rain and consolidation have it, or a stage with water_level or steady_flow = true")  # fmt: skip
-
-
-def warn_of_pressures(table: dict[str, Any], path: Path) -> None:
-    """Warn of the loads of a file for a study that has none that change in time."""
-    if table.get("pressures"):
-        say(f"{path}: the loads of [pressures] are left out here; the study consolidation has them, and the studies of stages "
-            "the pressure of a stage")  # fmt: skip
-
-
-def warn_of_members(table: dict[str, Any], path: Path) -> None:
-    """Warn of the structural members of a file for a study that has none."""
-    if table.get("members"):
-        names = ", ".join(map(repr, table["members"]))
-        say(f"{path}: the structural members {names} are left out here; the studies safety, collapse, slope, excavation, embankment "
-            "and consolidation have them")  # fmt: skip
-
-
-def geometry_of(table: dict[str, Any], path: Path) -> mpm.Geometry | None:
-    """Axial symmetry where the table of a site says so, None for plane strain; path: of the file, for messages."""
-    axisymmetric = table.get("axisymmetric", False)
-    if not isinstance(axisymmetric, bool):
-        raise mpm.InputError(f"{path}: axisymmetric is {axisymmetric!r}, expected true or false")
-    return mpm.Geometry.AXISYMMETRIC if axisymmetric else None
 
 
 def site_of(
@@ -312,48 +277,6 @@ def _require_columns(members: Collection[str], path: Path) -> None:
             raise mpm.InputError(
                 f"{path}: members: {other!r} and {name!r} would have the same columns in tables, expected other names"
             )
-
-
-def site_mesh(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None) -> tuple[Any, Any, Any]:
-    """The mesh that the table of a site's file names, cell tags and facet tags; `cell_size` [m] instead of the one there."""
-    size = table.get("cell_size") if cell_size is None else cell_size
-    constants = table.get("constants", {}) | ({} if size is None else {"cell_size": size})
-    mesh = path.parent / str(table["mesh"])
-    try:
-        return bridge.read_mesh(mesh, comm, parameters=constants)
-    except mpm.InputError as error:
-        raise mpm.InputError(f"{path}: mesh: {error}") from None
-
-
-def part_of_mesh(mesh: tuple[Any, Any, Any], soils: Collection[str]) -> tuple[Any, Any, Any]:
-    """Domain, cell tags and facet tags of some soils; the mesh itself where it has no others. Collective."""
-    return mesh if set(bridge.names_of(mesh[1])) == set(soils) else bridge.soil_mesh(*mesh, tag=list(soils))
-
-
-def check_soils(table: dict, path: Path, cell_tags: Any) -> None:
-    """Compare the soils of a site with the groups of its mesh: warns of groups without a soil, whose cells hold none.
-
-    Raises:
-        InputError: a soil that the mesh does not have.
-    """
-    names = list(bridge.names_of(cell_tags))
-    for soil in table["soils"]:
-        if soil not in names:
-            raise mpm.InputError(
-                f"{path}: soils.{soil}: no cell has the name {soil!r}; the mesh has {', '.join(map(repr, names))}"
-            )
-    declared = table.get("air", [])
-    named = {*table["soils"], *AIR, *([declared] if isinstance(declared, str) else declared)}
-    left = [name for name in bridge.names_of(cell_tags) if name not in named]
-    if left:
-        groups = ", ".join(map(repr, left))
-        say(f"{path} has no soil for {groups} of the mesh, which therefore holds none, as air; add [soils.NAME], or air = {left!r} "
-            "where it is meant")  # fmt: skip
-
-
-def cell_size_of(path: Path) -> float | None:
-    """Cell size [m] that a site names; None where it names none."""
-    return read_site_table(path).get("cell_size")
 
 
 def _stage(given: dict, number: int, site: Site, laws: dict[str, Any], path: Path) -> bridge.Stage:

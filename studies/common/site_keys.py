@@ -57,6 +57,10 @@ STAGE_KEYS = (
     "name", "day", "duration", "fill", "excavate", "boundaries", "law", "unit_weight", "pressure", "support", "release",
     "water_level", "steady_flow", "reset_displacement", "install", "remove",
 )  # fmt: skip
+CHANGES = ("excavate", "law", "unit_weight", "pressure", "support", "release", "install", "remove")
+"""What a stage may change beside soils that it places"""
+STAGE_WATER = ("water_level", "steady_flow")
+"""Keys of a stage that give it pore pressures"""
 
 
 def read_site_table(path: Path, needed: Sequence[str] = ()) -> dict[str, Any]:

@@ -21,7 +21,8 @@ from .page import Page
 from .quiet import NOT_REACHED, without_warning
 from .results import open_results
 from .site_field_plots import random_pictures
-from .site_file import Site, cell_size_of, read_site
+from .site_file import Site, read_site
+from .site_mesh import cell_size_of
 from .slope_fem import finite_elements, step_line
 from .summary import write_summary
 from .water_table import level_line

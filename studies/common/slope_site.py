@@ -22,10 +22,10 @@ from fenics_bridge.water.boundary import value_at
 from fenics_bridge.water.soils import WATER_WEIGHT
 
 from .checks import say
-from .site_doubts import warn_of_flooded_ground, warn_of_reservoirs
-from .site_file import CHANGES, Site, site_of, warn_of_members, warn_of_pressures
+from .site_doubts import warn_of_flooded_ground, warn_of_members, warn_of_pressures, warn_of_reservoirs
+from .site_file import Site, site_of
 from .site_flow import boundary_of, wet_soils
-from .site_keys import changes_of
+from .site_keys import CHANGES, changes_of
 from .water_site import corners_of, effective_laws, read_water_table, standing_load, times_of
 
 

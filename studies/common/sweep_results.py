@@ -188,6 +188,7 @@ def said(runs: list[Run], results: dict[str, Any]) -> str:
             lines.append(f"{label(name)}: {row['smallest']:.4g} to {row['largest']:.4g}{spread}")
     for name, row in results.get("probabilities", {}).items():
         if row["runs"]:
-            lines.append(f"{label(name)} is below {row['limit']:g} in {row['runs_below']} of {row['runs']} runs, "
-                         f"{row['probability_below']:.2%} (95 % interval {row['interval_low']:.2%} to {row['interval_high']:.2%})")  # fmt: skip
+            interval = f"95 % interval {row['interval_low']:.2%} to {row['interval_high']:.2%}"
+            below = f"in {row['runs_below']} of {row['runs']} runs, {row['probability_below']:.2%} ({interval})"
+            lines.append(f"{label(name)} is below {row['limit']:g} {below}")
     return "\n".join(lines)

@@ -16,9 +16,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from talus.launch import ALONE, environment
-
 from mpm_core import InputError
+from talus.launch import ALONE, environment
 
 from .files import PROGRAM, write_text
 from .parameters import did_you_mean, to_toml

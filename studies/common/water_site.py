@@ -17,7 +17,7 @@ Example of a file:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Container, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,9 +31,10 @@ from fenics_bridge import water
 
 from .checks import say
 from .site_doubts import warn_of_flooded_ground, warn_of_reservoirs
-from .site_file import Site, check_soils, geometry_of, part_of_mesh, site_mesh
+from .site_file import Site
 from .site_flow import boundary_of, wet_soils
 from .site_keys import DAY, UNDRAINED, changes_of, member_of, read_site_table
+from .site_mesh import check_soils, geometry_of, part_of_mesh, site_mesh
 
 
 @dataclass

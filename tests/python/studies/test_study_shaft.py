@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from axisymmetric_cases import cylinder_particles
-from mpi4py import MPI
-from study_main import main
-
-import mpm_core as mpm
 from common.movie import areas
 from common.seepage_plots import flow_picture
 from common.site_file import read_site
 from common.slope_site import read_slope_site
 from common.water_site import read_water_site
+from mpi4py import MPI
+from study_main import main
+
+import mpm_core as mpm
 
 MESHES = Path(__file__).parents[3] / "meshes"
 SHAFT = (MESHES / "shaft.toml").read_text().replace("cell_size = 1.0", "cell_size = 2.0")

@@ -1,15 +1,15 @@
 """Free fields beside soil whose water has a velocity of its own: it flows up and down through them, and they settle."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 from core_cases import box
+from mpm_core.free_field import layers_at, layers_of
+from mpm_core.ground_column import GroundColumn, Layers
 from two_phase_cases import BASE, DENSITY, ELASTIC, GAMMA, LEFT, OEDOMETER, POROSITY, RIGHT, WATER
 
 import mpm_core as mpm
-from mpm_core.free_field import layers_at, layers_of
-from mpm_core.ground_column import GroundColumn, Layers
 
 HEIGHT, MODULUS, CONDUCTIVITY = 1.0, 6e7, 5e-4
 EXCESS = 20e3
