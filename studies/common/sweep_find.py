@@ -15,6 +15,8 @@ MOST_RUNS = 20
 NEAR = 1e-3
 """Error of the value over the width of the interval, and of the result over the difference of those at its ends, at which the search
 ends"""
+JUMP = 0.05
+"""Distance of the result from the target, over the difference of those at the ends of the interval, from which it jumps past the target"""
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ def wanted_of(parameter: str, target: str) -> Wanted:
         low, high = map(float, interval.split(":"))
     except ValueError:
         low = high = math.nan
-    if not name or not low < high:
+    if not name or not -math.inf < low < high < math.inf:
         raise InputError(
             f"--find is {parameter!r}, expected NAME=LOW:HIGH with rising numbers, such as friction-angle=15:35"
         )
@@ -96,7 +98,9 @@ def find(wanted: Wanted, results_at: Callable[[list[float]], list[float]]) -> Fo
     except _Unknown as unknown:
         reason = f"{wanted.result} is not known where {wanted.name} is {unknown.value:g}"
     there = {value: result for value, result in known.items() if math.isfinite(result)}
-    best = min(there, key=lambda value: abs(there[value] - wanted.target), default=math.nan)
+    best = min(reversed(there), key=lambda value: abs(there[value] - wanted.target), default=math.nan)
+    if not reason and abs(there[best] - wanted.target) > JUMP / NEAR * near:
+        reason = f"{wanted.result} jumps past {wanted.target:g} where {wanted.name} is {best:.4g}"
     return Found(best, there.get(best, math.nan), reason)
 
 

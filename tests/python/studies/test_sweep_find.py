@@ -1,6 +1,7 @@
 """Back-analysis: the value of a parameter for which a result has a given value."""
 
 import csv
+import importlib
 import json
 import math
 
@@ -52,7 +53,13 @@ def test_a_run_without_the_result_ends_the_search():
     assert found.reason == "y is not known where x is 0" and math.isnan(found.value)
 
 
+def test_a_result_that_jumps_past_the_target_is_named():
+    found, _ = searched(lambda x: 1.0 if x < 7.3 else 3.0)
+    assert found.reason.startswith("y jumps past 2 where x is 7.") and found.value == pytest.approx(7.3, abs=0.02)
+
+
 @pytest.mark.parametrize("parameter, target, expected", [
+    ("x=1:inf", "y=1", "--find is 'x=1:inf', expected NAME=LOW:HIGH"),
     ("x=3", "y=1", "--find is 'x=3', expected NAME=LOW:HIGH"), ("x=3:1", "y=1", "with rising numbers"),
     ("=1:3", "y=1", "--find is '=1:3'"), ("x=1:3", "y", "--target is 'y', expected RESULT=VALUE"),
     ("x=1:3", "y=nan", "--target is 'y=nan'"),
@@ -85,3 +92,20 @@ def test_the_cohesion_of_a_measured_strength_is_found(tmp_path, without_pictures
 def test_options_that_do_not_fit_are_refused(tmp_path, words, expected):
     end = study_main.ended("sweep", tmp_path, *words, "element_test")
     assert end.returncode == 2 and expected in end.stderr
+
+
+def test_a_search_that_is_interrupted_makes_no_further_run(tmp_path, without_pictures, monkeypatch):
+    """Runs that end by themselves when the signal comes have results all the same."""
+    sweep = importlib.import_module("sweep")
+
+    def made(runs, *_):
+        for run in runs:
+            run.code, run.numbers = run.code or 0, {"y": run.values["cohesion"]}
+        calls.append(len(runs))
+        return True
+
+    calls = []
+    monkeypatch.setattr(sweep, "make_all", made)
+    a = sweep.parse(["--find", "cohesion=1:4", "--target", "y=2", "--output", str(tmp_path / "s"), "element_test"])
+    assert sweep.back_analysis(a, sweep.study_named(a)) == 1 and calls == [2]
+    assert json.loads((tmp_path / "s" / "summary.json").read_text())["stopped_because"] == "it was interrupted"
