@@ -34,7 +34,7 @@ from common.summary import write_summary
 from common.sweep_find import find as find_value
 from common.sweep_find import wanted_of
 from common.sweep_maps import hazard_maps
-from common.sweep_plan import Variable, correlation_of, plan, variable_of
+from common.sweep_plan import Variable, correlation_of, number_of, plan, variable_of
 from common.sweep_plots import picture_of
 from common.sweep_results import drawn_results, ended_before, label, said, summarise, write_table
 from common.sweep_runs import Run, Study, carry_out, processors, require_names, runs_of, study_of, take_results
@@ -127,12 +127,12 @@ def parse(arguments: Sequence[str] | None = None) -> Namespace:
 
 def split(p: ArgumentParser, words: Sequence[str]) -> tuple[list[str], list[str]]:
     """The words of the sweep, and those from the study's name on."""
-    flags = {name for action in p._actions if action.nargs == 0 for name in action.option_strings}
+    with_value = {name for action in p._actions if action.nargs != 0 for name in action.option_strings}
     k = 0
     while k < len(words) and words[k].startswith("-"):
         if words[k] == "--run":
             return list(words[:k]), list(words[k + 1 :])
-        k += 1 if words[k] in flags or "=" in words[k] else 2
+        k += 2 if words[k] in with_value else 1
     return list(words[:k]), list(words[k:])
 
 
@@ -141,10 +141,10 @@ def limits_of(words: Sequence[str]) -> dict[str, float]:
     limits = {}
     for word in words:
         name, _, text = word.partition("=")
-        try:
-            limits[name] = float(text)
-        except ValueError:
-            raise InputError(f"--limit is {word!r}, expected NAME=X, such as factor_of_safety=1") from None
+        limit = number_of(text)
+        if not name or limit is None:
+            raise InputError(f"--limit is {word!r}, expected NAME=X, such as factor_of_safety=1")
+        limits[name] = limit
     return limits
 
 
@@ -165,6 +165,7 @@ def make_all(
         InputError: the first run to end has refused its options, or has not the results that were named.
     """
     waiting, refusals = [run for run in runs if run.code is None], []
+    write_table(folder, runs, names)  # so that a sweep that is killed during its first runs can be resumed
     with Interrupt() as interrupt, Progress("runs", len(runs), unit="runs", counted="runs") as progress:
         for done, run in enumerate(carry_out(waiting, study, jobs, lambda: bool(refusals) or interrupt.requested()), 1):
             if done == 1:
@@ -178,8 +179,13 @@ def make_all(
 
 
 def refusal(run: Run, named: Sequence[str]) -> list[str]:
-    """Why the runs of a sweep make no sense, by the first that has ended; empty where they do."""
-    if run.code == BAD_INPUT and not run.results:
+    """Why the runs of a sweep make no sense, by the first that has ended; empty where they do.
+
+    A run that has opened its folder understands its options; it may have ended since soil of its strength does not carry its weight, as
+    others may.
+    """
+    opened = (run.folder / "parameters.toml").is_file()
+    if run.code == BAD_INPUT and not run.numbers and not opened:
         return [f"run {run.number} was refused: {run.reason}"]
     missing = [name for name in named if run.results and name not in run.results]
     there = ", ".join(name for name in run.results if "." not in name)
@@ -217,7 +223,7 @@ def swept(a: Namespace, study: Study) -> int:
     rows = plan(variables, a.samples, dict(map(correlation_of, a.correlate)), a.seed, a.one_at_a_time)
     names, named = [one.name for one in variables], [*a.result, *limits]
     require_names(study, names)
-    kept = ended_before(a.output, rows, names) if a.resume else {}
+    kept = ended_before(a.output, rows, names, a.run) if a.resume else {}
     folder = open_results(a, MPI.COMM_SELF, adds=a.resume)
     runs = runs_of(study, rows, folder)
     for run in runs:
@@ -225,7 +231,7 @@ def swept(a: Namespace, study: Study) -> int:
             run.code, run.seconds = kept[run.number]
             take_results(run)
     there = f", of which {len(kept)} are there" if kept else ""
-    print(f"{len(runs)} runs of {study.script.stem}{there}", flush=True)
+    print(f"{len(runs)} run{'s' * (len(runs) > 1)} of {study.script.stem}{there}", flush=True)
     interrupted = make_all(runs, study, folder, names, named, jobs(a))
     shown = drawn_results(runs, named) if any(run.results for run in runs) else []
     results = summarise(runs, variables, shown, limits, a.one_at_a_time)
@@ -244,19 +250,21 @@ def back_analysis(a: Namespace, study: Study) -> int:
     folder, runs, interrupted = open_results(a, MPI.COMM_SELF), [], []
 
     def results_at(values: list[float]) -> list[float]:
+        if interrupted:
+            return [math.nan] * len(values)  # which ends the search
         new = runs_of(study, [{wanted.name: value} for value in values], folder, len(runs) + 1)
         runs.extend(new)
         if make_all(runs, study, folder, [wanted.name], [wanted.result], jobs(a)):
             interrupted.append("it was interrupted")
-        return [float(run.results.get(wanted.result, math.nan)) for run in new]
+        return [run.result(wanted.result) for run in new]
 
     found = find_value(wanted, results_at)
     label_of = _with_unit(wanted.name, {**law_units(), **study.units})
     reason = "".join(interrupted) or found.reason
     results: dict[str, Any] = {
         "parameter": wanted.name,
-        "value": found.value,
-        wanted.result: found.result,
+        "value": found.value if math.isfinite(found.value) else None,
+        wanted.result: found.result if math.isfinite(found.result) else None,
         "target": wanted.target,
     }
     if reason:

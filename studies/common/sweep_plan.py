@@ -62,8 +62,13 @@ def variable_of(word: str) -> Variable:
         )
     if parts[0] in DISTRIBUTIONS:
         return Variable(name, quantile=_quantile(parts[0], parts[1:], word))
-    numbers = [_number(part) for part in parts]
+    numbers = [number_of(part) for part in parts]
+    if len(parts) > 2 and numbers[0] is None and None not in numbers[1:]:
+        known = ", ".join(DISTRIBUTIONS)
+        raise InputError(f"--vary is {word!r}, expected one of the distributions {known}; there is no {parts[0]!r}")
     if len(parts) == 1 or None in numbers:
+        if "" in text.split(","):
+            raise InputError(f"--vary is {word!r}, expected a value before and after each comma")
         return Variable(name, tuple(map(_value, text.split(","))))
     if len(numbers) != 3 or numbers[2] != int(numbers[2] or 0) or (numbers[2] or 0) < 2:
         raise InputError(f"--vary is {word!r}, expected FROM:TO:COUNT with at least two values")
@@ -93,8 +98,13 @@ def plan(
             exceeded with 95 and 5 %.
 
     Raises:
-        InputError: distributions without a number of samples, or correlations that are not possible together.
+        InputError: a parameter that is there twice, distributions without a number of samples, or correlations that are not possible
+            together.
     """
+    names = [one.name.replace("_", "-") for one in variables]
+    twice = next((one.name for k, one in enumerate(variables) if names[k] in names[:k]), None)
+    if twice is not None:
+        raise InputError(f"--vary names {twice} twice, expected each parameter once, with all of its values")
     if one_at_a_time:
         return [{}, *({one.name: value} for one in variables for value in _alone(one))]
     lists = [one for one in variables if one.quantile is None]
@@ -115,14 +125,16 @@ def _alone(variable: Variable) -> Sequence[Value]:
 def _drawn(
     random: Sequence[Variable], samples: int, correlations: Mapping[tuple[str, str], float], seed: int
 ) -> list[Row]:
-    if not random:
+    if not random and not correlations:
         return [{}]
     names = [one.name for one in random]
     correlation = np.eye(len(names))
     for (first, second), coefficient in correlations.items():
         for name in (first, second):
             if name not in names:
-                raise InputError(f"--correlate names {name}, expected two of the random parameters {', '.join(names)}")
+                raise InputError(
+                    f"--correlate names {name}, expected two parameters with distributions; these are {', '.join(names) or 'none'}"
+                )
         i, j = names.index(first), names.index(second)
         correlation[i, j] = correlation[j, i] = coefficient
     try:
@@ -137,7 +149,7 @@ def _drawn(
 
 def _quantile(kind: str, parts: Sequence[str], word: str) -> Callable[[Any], Any]:
     """The quantile function of a distribution."""
-    numbers = [_number(part) for part in parts]
+    numbers = [number_of(part) for part in parts]
     form, count = DISTRIBUTIONS[kind]
     limited = kind in ("normal", "lognormal") and len(numbers) == 4
     given = [x for x in numbers if x is not None]
@@ -170,7 +182,7 @@ def _within(distribution: Any, limits: Sequence[float], word: str) -> Callable[[
     return lambda u: distribution.ppf(low + u * (high - low))
 
 
-def _number(text: str) -> float | None:
+def number_of(text: str) -> float | None:
     """A finite number; None for another text."""
     try:
         number = float(text)
@@ -181,7 +193,7 @@ def _number(text: str) -> float | None:
 
 def _value(text: str) -> Value:
     """A value of a list as TOML has it."""
-    number = _number(text)
+    number = number_of(text)
     if number is None:
         return text == "true" if text in ("true", "false") else text
     return int(text) if text.lstrip("+-").isdecimal() else number
@@ -199,7 +211,7 @@ def correlation_of(word: str) -> tuple[tuple[str, str], float]:
         InputError: it is not of this form, or R is not between -1 and 1.
     """
     names, _, text = word.partition("=")
-    pair, coefficient = names.split(","), _number(text)
+    pair, coefficient = names.split(","), number_of(text)
     if len(pair) != 2 or pair[0] == pair[1] or coefficient is None or not -1 < coefficient < 1:
         raise InputError(
             f"--correlate is {word!r}, expected two names and a coefficient between -1 and 1: NAME,NAME=-0.5"

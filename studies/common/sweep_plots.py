@@ -115,7 +115,7 @@ def _scatter(
 
 def _tornado(path: Path, runs: Sequence[Run], result: str, names: Mapping[str, str], mark: Mark) -> None:
     """The change of the result by each parameter alone, those that change it most at the top."""
-    rows, base = changes_alone(runs, result), float(runs[0].results.get(result, math.nan))
+    rows, base = changes_alone(runs, result), runs[0].result(result)
     parameters = list(dict.fromkeys(name for name, _, _ in rows))
     with curve_figure(path, (5.6, 0.9 + 0.5 * len(parameters))) as axes:
         for k, name in enumerate(parameters):

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import copy
 import json
+import math
 import os
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -27,7 +29,8 @@ from .sweep_plan import Row, Value
 
 LOOK = 0.05
 """Pause between two looks at the runs [s]"""
-NOT_RESULTS = ("parameters", "versions", "ranks", "machine", "finished", "run_seconds", "not_written", "restarts")
+NOT_RESULTS = ("parameters", "versions", "ranks", "machine", "finished", "run_seconds", "not_written", "restarts",
+               "stopped_because")  # fmt: skip
 """What stands in a summary beside its results"""
 
 
@@ -42,10 +45,20 @@ class Run:
     code: int | None = None
     """Exit code; None before its end"""
     seconds: float = 0.0
-    results: dict[str, Any] = field(default_factory=dict)
-    """Numbers of its summary by name; of tables with dots"""
+    numbers: dict[str, float | None] = field(default_factory=dict)
+    """Numbers of its summary by name, of tables with dots; None of a result that is not known"""
     reason: str = ""
-    """Why it has no results, or ended early"""
+    """Why it has no summary, or ended early"""
+
+    @property
+    def results(self) -> dict[str, float | None]:
+        """Numbers of a run that came to its end; what one that ended early has found so far would distort statistics."""
+        return {} if self.reason else self.numbers
+
+    def result(self, name: str) -> float:
+        """A result by name; NaN where there is none."""
+        value = self.results.get(name)
+        return math.nan if value is None else float(value)
 
 
 @dataclass(frozen=True)
@@ -64,12 +77,13 @@ class Study:
 
     def site(self) -> Path | None:
         """The file of `--site`; None where the words name none."""
+        found = None  # of several the last one counts, as for the study
         for k, word in enumerate(self.words):
             if word.startswith("--site="):
-                return Path(word.removeprefix("--site="))
-            if word == "--site" and k + 1 < len(self.words):
-                return Path(self.words[k + 1])
-        return None
+                found = Path(word.removeprefix("--site="))
+            elif word == "--site" and k + 1 < len(self.words):
+                found = Path(self.words[k + 1])
+        return found
 
 
 def study_of(script: Path, words: Sequence[str], ranks: int) -> Study:
@@ -127,12 +141,12 @@ def runs_of(study: Study, rows: Sequence[Row], folder: Path, first: int = 1) -> 
     Raises:
         InputError: a key that the site cannot have.
     """
-    digits, site = max(3, len(str(len(rows)))), study.site()
+    site = study.site()
     table = read_site_table(site) if site is not None and any("." in name for row in rows for name in row) else {}
     runs = []
     (folder / "runs").mkdir(exist_ok=True)
     for number, row in enumerate(rows, first):
-        place = folder / "runs" / f"{number:0{digits}d}"
+        place = folder / "runs" / f"{number:03d}"  # the same name where more samples follow
         words = [sys.executable, str(study.script), *study.words]
         if study.ranks > 1:
             words = [sys.executable, "-m", "talus.launch", str(study.ranks), *words]
@@ -222,10 +236,13 @@ def carry_out(runs: Sequence[Run], study: Study, jobs: int, stop: Callable[[], b
 
 
 def _started(run: Run, study: Study) -> subprocess.Popen:
+    # In a session of its own, so that Ctrl-C comes once only, by the sweep: the second signal would end mpirun at once. A run whose sweep
+    # is killed must not go on, since it would keep its folder from the sweep that resumes.
+    killed = ["setpriv", "--pdeathsig", "KILL"] if shutil.which("setpriv") else []
     with open(log_of(run), "w", encoding="utf-8") as log:
         return subprocess.Popen(
-            [*run.command, "--overwrite"], stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
-            env=study.variables(),
+            [*killed, *run.command, "--overwrite"], stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
+            env=study.variables(), start_new_session=True,
         )  # fmt: skip
 
 
@@ -241,9 +258,9 @@ def take_results(run: Run) -> None:
     except (OSError, ValueError):
         text = log_of(run).read_text(encoding="utf-8", errors="replace") if log_of(run).is_file() else ""
         signalled = f"signal {-(run.code or 0)} ended it" if (run.code or 0) < 0 else ""
-        run.results, run.reason = {}, signalled or last_line(text) or f"its exit code is {run.code}"
+        run.numbers, run.reason = {}, signalled or last_line(text) or f"its exit code is {run.code}"
         return
-    run.results = {
+    run.numbers = {
         name: value
         for key, part in summary.items()
         if key not in NOT_RESULTS
@@ -252,9 +269,9 @@ def take_results(run: Run) -> None:
     run.reason = str(summary.get("stopped_because") or "")
 
 
-def numbers_of(value: Any, name: str) -> dict[str, float]:
-    """The numbers in a value of a summary, by name and, within tables, by names with dots; lists of numbers are left out."""
-    if isinstance(value, (bool, int, float)):
+def numbers_of(value: Any, name: str) -> dict[str, float | None]:
+    """The numbers in a value of a summary, None among them, by name and, within tables, by names with dots; lists of numbers are left out."""
+    if value is None or isinstance(value, (bool, int, float)):
         return {name: value}
     inner = value.items() if isinstance(value, dict) else enumerate(value) if _is_table(value) else ()
     return {key: one for part, given in inner for key, one in numbers_of(given, f"{name}.{part}").items()}

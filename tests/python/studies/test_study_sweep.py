@@ -4,6 +4,12 @@ import csv
 import importlib
 import json
 import math
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import pytest
 from study_main import STUDIES, ended
@@ -100,6 +106,8 @@ def study_site():
     (["--vary", "soils.a.young=1,2", "safety"], "a key of a site, expected --site FILE"),
     (["--vary", "soils.rock.young=1,2", "safety", "--site", study_site()], "has no 'rock' there; it has clay, layer 1"),
     (["--vary", "soils.clay.yong=1,2", "safety", "--site", study_site()], "unknown key 'yong'; did you mean young?"),
+    (["--limit", "q_Pa=nan", "--vary", "cohesion=1,2", "element_test"], "--limit is 'q_Pa=nan', expected NAME=X"),
+    (["--no-pictures", "--vary", "cohesion=1,2", "element_test"], "unrecognized arguments: --no-pictures"),
     (["--limit", "q_Pa", "--vary", "cohesion=1,2", "element_test"], "--limit is 'q_Pa', expected NAME=X"),
 ])  # fmt: skip
 def test_impossible_sweeps_are_refused_before_anything_runs(tmp_path, words, expected):
@@ -113,3 +121,51 @@ def test_a_result_that_the_study_does_not_have_is_named_after_the_first_run(tmp_
                 "element_test", *Q)  # fmt: skip
     assert end.returncode == 2 and "q is no result of the study, expected one of" in end.stderr and "q_Pa" in end.stderr
     assert len(list((tmp_path / "s" / "runs").glob("*.log"))) == 1
+
+
+SLOW = """
+import sys, time
+from pathlib import Path
+folder = Path(sys.argv[sys.argv.index("--output") + 1])
+folder.with_suffix(".began").touch()
+time.sleep(60)
+"""
+
+
+def test_runs_end_with_a_sweep_that_is_killed(tmp_path):
+    """What goes on would keep its folder from the sweep that resumes."""
+    if shutil.which("setpriv") is None:
+        pytest.skip("setpriv is not there")
+    (tmp_path / "slow.py").write_text(SLOW)
+    text = f"""
+import sys
+sys.path[:0] = {[str(STUDIES), str(STUDIES.parent)]}
+from pathlib import Path
+from common.sweep_runs import Study, carry_out, runs_of
+study = Study(Path({str(tmp_path / "slow.py")!r}), [], 1, {{}})
+list(carry_out(runs_of(study, [{{}}], Path({str(tmp_path)!r})), study, 1, lambda: False))
+"""
+    sweep = subprocess.Popen([sys.executable, "-c", text])
+    until(lambda: (tmp_path / "runs" / "001.began").exists())
+    children = Path(f"/proc/{sweep.pid}/task/{sweep.pid}/children").read_text().split()
+    assert children and all(
+        os.getsid(int(child)) == int(child) for child in children
+    )  # Ctrl-C comes by the sweep alone
+    sweep.kill()
+    sweep.wait()
+    until(lambda: not any(alive(child) for child in children))
+
+
+def alive(process):
+    """Whether a process runs; one that has ended may still be in the table of processes."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False
+
+
+def until(condition, seconds=30.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)

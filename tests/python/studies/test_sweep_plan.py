@@ -9,9 +9,20 @@ import study_main  # noqa: F401
 from common.site_tables import merged
 from common.sweep_maps import hazard_maps
 from common.sweep_plan import correlation_of, plan, variable_of
-from common.sweep_results import changes_alone, probability_below, rank_correlations, statistics
-from common.sweep_runs import Run, numbers_of, site_with
+from common.sweep_results import (
+    changes_alone,
+    ended_before,
+    probability_below,
+    rank_correlations,
+    said,
+    statistics,
+    summarise,
+    values_of,
+    write_table,
+)
+from common.sweep_runs import Run, Study, numbers_of, runs_of, site_with, take_results
 from scipy import stats
+from sweep import refusal
 
 from fenics_bridge.terrain import Raster, read_raster, write_raster
 from mpm_core import InputError
@@ -93,6 +104,8 @@ def test_one_at_a_time_begins_with_an_unchanged_run():
     ("=3", "expected NAME=VALUES"),
     ("c=1:2", "expected FROM:TO:COUNT"),
     ("c=1:2:1", "at least two values"),
+    ("c=1,,2", "a value before and after each comma"),
+    ("c=norml:5:1", "expected one of the distributions normal, lognormal, uniform, triangular; there is no 'norml'"),
     ("c=normal:5", "expected normal:MEAN:SD, or with :LOW:HIGH"),
     ("c=normal:5:-1", "standard deviation above 0"),
     ("c=normal:5:0.1:90:91", "limits LOW:HIGH between which there are values"),
@@ -104,6 +117,11 @@ def test_impossible_values_are_refused_by_name(word, expected):
     with pytest.raises(InputError, match="--vary is") as error:
         variable_of(word)
     assert expected in str(error.value) and repr(word) in str(error.value)
+
+
+def test_a_parameter_has_its_values_once():
+    with pytest.raises(InputError, match="--vary names friction_angle twice"):
+        plan([variable_of("friction-angle=20,25"), variable_of("friction_angle=30")])
 
 
 def test_samples_and_distributions_need_each_other():
@@ -118,8 +136,10 @@ def test_impossible_correlations_are_refused():
         with pytest.raises(InputError, match="expected two names and a coefficient"):
             correlation_of(word)
     variables = [variable_of(f"{name}=normal:0:1") for name in "abc"]
-    with pytest.raises(InputError, match="names d, expected two of the random parameters a, b, c"):
+    with pytest.raises(InputError, match="names d, expected two parameters with distributions; these are a, b, c"):
         plan(variables, 4, {("a", "d"): 0.5})
+    with pytest.raises(InputError, match="names a, expected two parameters with distributions; these are none"):
+        plan([variable_of("a=1,2")], None, {("a", "b"): 0.5})
     with pytest.raises(InputError, match="not possible together"):
         plan(variables, 4, {("a", "b"): 0.9, ("b", "c"): 0.9, ("a", "c"): -0.9})
 
@@ -169,7 +189,7 @@ def test_the_probability_of_failure_is_that_of_a_normal_factor_of_safety():
 def test_no_failure_in_some_runs_leaves_an_upper_bound():
     # Wilson's interval of 0 of n ends at z^2 / (n + z^2), with z = 1.96.
     found = probability_below(np.full(40, 2.0), 1.0)
-    assert found["probability_below"] == 0 and math.isnan(found["reliability_index"])
+    assert found["probability_below"] == 0 and found["reliability_index"] is None
     assert found["interval_low"] == 0 and found["interval_high"] == pytest.approx(
         1.96**2 / (40 + 1.96**2), rel=1e-3
     )
@@ -179,6 +199,70 @@ def test_statistics_leave_out_runs_without_a_result():
     found = statistics(np.array([1.0, math.nan, 3.0]))
     assert (found["runs"], found["mean"], found["standard_deviation"]) == (2, 2.0, pytest.approx(math.sqrt(2)))
     assert statistics(np.array([math.nan])) == {"runs": 0}
+    assert statistics(np.array([2.0]))["standard_deviation"] is None  # JSON has no NaN
+
+
+def test_runs_without_the_result_may_be_those_below_the_limit():
+    # Of 10 runs 2 are below and 3 have no result: 2 of 7, and 5 of 10 if these are below too.
+    found = probability_below(np.array([0.5, 0.6, *[1.5] * 5, *[math.nan] * 3]), 1.0)
+    assert (found["runs"], found["runs_without_result"]) == (7, 3)
+    assert (found["probability_below"], found["probability_if_those_are_below"]) == (2 / 7, 0.5)
+    runs = [run(1, {"c": 1.0}, F=0.5), run(2, {"c": 2.0}, F=2.0), Run(3, {"c": 3.0}, Path("003"), [], 2, 0.0, {}, "no equilibrium"),
+            Run(4, {"c": 4.0}, Path("004"), [])]  # fmt: skip
+    results = summarise(runs, [variable_of("c=uniform:0:5")], ["F"], {"F": 1.0}, False)
+    assert results["probabilities"]["F"]["runs_without_result"] == 1  # the last one has not begun
+    assert "F is not known in 1 of 3 runs; if it is below 1 there, the probability is 66.67%" in said(runs, results)
+
+
+def test_what_a_run_that_ended_early_has_found_is_in_no_statistics(tmp_path):
+    early = Run(1, {"x": 1.0}, tmp_path, [], 143)
+    (tmp_path / "summary.json").write_text('{"front_m": 3.0, "angle": null, "stopped_because": "interrupted at 2 s"}')
+    take_results(early)
+    assert early.numbers == {"front_m": 3.0, "angle": None} and early.reason == "interrupted at 2 s"
+    assert values_of([early, run(2, {"x": 2.0}, front_m=5.0)], "front_m") == pytest.approx([math.nan, 5.0], nan_ok=True)
+    write_table(tmp_path, [early], ["x"])
+    assert (tmp_path / "sweep.csv").read_text().splitlines()[1].startswith("1,1.0,143,0,interrupted at 2 s,3.0,")
+
+
+def test_a_result_that_is_not_known_in_the_first_run_is_one_of_the_study():
+    first = run(1, {}, front_m=3.0, angle=None)
+    assert refusal(first, ["angle"]) == [] and math.isnan(first.result("angle"))
+    assert refusal(first, ["angel"])[0].startswith("angel is no result of the study; did you mean angle?")
+
+
+def test_a_run_that_fails_in_its_work_does_not_speak_for_the_others(tmp_path):
+    """Soil of the first strength may not carry its weight, which ends the study with the code of bad input."""
+    first = Run(1, {}, tmp_path, [], 2, 0.0, {}, "no equilibrium")
+    assert refusal(first, []) == ["run 1 was refused: no equilibrium"]
+    (tmp_path / "parameters.toml").write_text("")
+    assert refusal(first, []) == []
+
+
+def test_runs_keep_their_names_when_more_samples_follow(tmp_path):
+    study = Study(Path("study.py"), [], 1, {})
+    few, many = (runs_of(study, [{"x": 1.0}] * n, tmp_path) for n in (999, 1000))
+    assert [run.folder for run in many[:999]] == [run.folder for run in few]
+
+
+def test_a_sweep_goes_on_where_results_have_the_names_of_parameters(tmp_path):
+    runs = [run(1, {"cell_size": 2.0, "seconds": 3.0}, cell_size=1.99, seconds=4.0)]
+    names = ["cell_size", "seconds"]
+    write_table(tmp_path, runs, names)
+    rows = [{"cell_size": 2.0, "seconds": 3.0}, {"cell_size": 1.0, "seconds": 3.0}]
+    assert ended_before(tmp_path, rows, names, ["slope"]) == {1: (0, 0.0)}
+    with pytest.raises(InputError, match="run 1 in .* has other values than this sweep; .*at least as many --samples"):
+        ended_before(tmp_path, [], names, ["slope"])
+    with pytest.raises(InputError, match="is of a sweep with other parameters, expected the same --vary"):
+        ended_before(tmp_path, rows, ["cell_size"], ["slope"])
+    (tmp_path / "parameters.toml").write_text('run = ["slope", "--time", "5"]')
+    with pytest.raises(
+        InputError, match="are of 'slope --time 5', not of 'slope'; expected the same study and options"
+    ):
+        ended_before(tmp_path, rows, names, ["slope"])
+
+
+def test_of_several_sites_the_last_one_counts():
+    assert Study(Path(), ["--site", "a.toml", "--site=b.toml"], 1, {}).site() == Path("b.toml")
 
 
 def test_rank_correlations_are_those_of_monotonic_functions():
