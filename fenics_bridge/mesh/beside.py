@@ -68,10 +68,13 @@ def tags_beside(domain: mesh.Mesh, cell_tags: MeshTags, wall: Any) -> tuple[Mesh
 def _beside(corners: NDArray[np.float64], line: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which cells, with the corners (m, 3, 2) [m], touch a line and lie beside it, not beyond its ends: (m,)."""
     size = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
-    apart = np.min([distance_from(corners[:, k], line) for k in range(3)], axis=0)
     centre, beside = corners.mean(axis=1), np.zeros(len(corners), dtype=bool)
-    for start, end in zip(line, line[1:]):
+    ring, last = np.array_equal(line[0], line[-1]), len(line) - 2
+    for k, (start, end) in enumerate(zip(line, line[1:])):
+        apart = np.min([distance_from(corners[:, j], line[k : k + 2]) for j in range(3)], axis=0)
         along = end - start
         part = (centre - start) @ along / (along @ along)
-        beside |= (part >= 0) & (part <= 1)
-    return (apart <= TOUCHING * size) & beside
+        # Around a corner of the line there are cells that lie beyond the ends of both of its sides, and touch the line all the same.
+        inside = ((part >= 0) | ring | (k > 0)) & ((part <= 1) | ring | (k < last))
+        beside |= (apart <= TOUCHING * size) & inside
+    return beside

@@ -94,6 +94,23 @@ def test_a_cell_beside_two_lines_has_a_tag_of_its_own():
     assert np.ptp(corners_of(domain, tags, [4])[:, :, 0]) == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize("line", [
+    [(2.0, 2.0), (2.0, 1.0), (3.0, 1.0)], [(1.0, 0.5), (3.0, 0.5), (3.0, 1.5), (1.0, 1.5), (1.0, 0.5)],
+])  # fmt: skip
+def test_cells_around_the_corners_of_a_line_are_beside_it(line):
+    """All cells with a node of the line, but those beyond its ends."""
+    domain, cell_tags, _ = tagged_box((4.0, 2.0), (16, 8))
+    tags, before = bridge.tags_beside(domain, cell_tags, line)
+    found, everywhere = corners_of(domain, tags, list(before)), corners_of(domain, tags, [1, *before])
+    for corner in line[1:-1] if line[0] != line[-1] else line:
+        assert at(found, corner) == at(everywhere, corner) > 2
+
+
+def at(corners, point):
+    """How many cells have a point among their corners."""
+    return int(np.any(np.all(np.isclose(corners, point), axis=2), axis=1).sum())
+
+
 def test_a_line_outside_of_the_mesh_touches_no_cell():
     domain, cell_tags, _ = tagged_box((4.0, 2.0), (8, 4))
     tags, before = bridge.tags_beside(domain, cell_tags, [(6.0, 2.0), (6.0, 1.0)])
