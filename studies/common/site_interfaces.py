@@ -28,9 +28,21 @@ class Interfaces:
     walls: dict[int, tuple[str, ...]] = field(default_factory=dict)
 
     def law(self, tag: int, law: Any, there: Any) -> Any:
-        """The law of a tag's cells beside those of its walls that are there, which has the strength of the weakest interface."""
-        fractions = [self.fractions[wall] for wall in self.walls.get(tag, ()) if wall in there]
-        return bridge.reduced_strength(law, 1 / min(fractions)) if fractions and min(fractions) < 1 else law
+        """The law of a tag's cells beside those of its walls that are there, which has the strength of the weakest interface.
+
+        Elastic soil has no strength, and stays as it is.
+
+        Raises:
+            InputError: the strength of the law is not known.
+        """
+        fractions = {wall: self.fractions[wall] for wall in self.walls.get(tag, ()) if wall in there}
+        weakest = min(fractions, key=fractions.__getitem__, default=None)
+        if weakest is None or fractions[weakest] == 1 or isinstance(law, mpm.LinearElastic):
+            return law
+        try:
+            return bridge.reduced_strength(law, 1 / fractions[weakest])
+        except mpm.InputError as error:
+            raise mpm.InputError(f"members.{weakest}: {INTERFACE}: {error}") from None
 
 
 def fractions_of(tables: Mapping[str, Any], path: Path) -> dict[str, float]:
@@ -97,9 +109,9 @@ def in_stages(
         given = {tag: law for soil, law in stage.law.items() for tag in tags_of(soil)}
         full |= given
         for tag in beside.walls:
-            law = beside.law(tag, full[tag], there)
-            changes = tag in given or law != acting[tag]
-            if changes and isinstance(full[tag], WITHOUT_MEMORY):
+            memory = not isinstance(full[tag], WITHOUT_MEMORY)
+            law = beside.law(tag, full[tag], beside.fractions if memory else there)
+            if tag in given or (law != acting[tag] and not memory):
                 given[tag] = law
                 further.append(law)
         acting |= given

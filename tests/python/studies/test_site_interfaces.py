@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 import study_main  # noqa: F401
 from common.site_file import read_site
+from common.site_interfaces import Interfaces, in_stages
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -88,6 +89,32 @@ def test_without_stages_the_wall_and_its_interface_are_there_from_the_beginning(
     assert weaker and all(
         facing.laws[tag] == bridge.reduced_strength(next(iter(plain.laws.values())), 1 / 0.8) for tag in weaker
     )
+
+
+def test_elastic_soil_beside_a_wall_has_no_strength_that_could_be_less(tmp_path):
+    site = site_in(tmp_path, '[members.wall]\ninterface_strength = 0.5\n[soils."cut 3"]\nmaterial = "elastic"\n')
+    laws = after(site, "wall")
+    assert all(isinstance(laws[tag], mpm.LinearElastic) for tag in site.tags_of(["cut 3"]))
+    assert any(laws[tag] != site.laws[tag] for tag in site.tags_of(["cut 2"]))
+
+
+def test_a_law_with_memory_that_comes_in_by_a_stage_is_weaker_beside_the_wall():
+    """It cannot change once it is there, also when the wall comes later."""
+    sand = mpm.MohrCoulomb(young=20e6, poisson=0.3, cohesion=1e3, friction_angle=33.0)
+    clay = mpm.CamClay(
+        compression=0.2, swelling=0.04, critical_slope=1.0, poisson=0.3, void_ratio=1.0, preconsolidation=100e3
+    )
+    stages = [
+        bridge.Stage("fill", fill=["soil"], unit_weight={"soil": 18e3}),
+        bridge.Stage("clay", law={"soil": clay}),
+        bridge.Stage("wall", install={"wall": None}),
+        bridge.Stage("no wall", remove=["wall"]),
+    ]
+    beside = Interfaces({"wall": 0.5}, {2: ("wall",)})
+    changed, further = in_stages(stages, {1: sand, 2: sand}, beside, lambda _: (1, 2))
+    weak = bridge.reduced_strength(clay, 2.0)
+    assert changed[1].law == {1: clay, 2: weak} and further == [weak]
+    assert not changed[2].law and not changed[3].law
 
 
 @pytest.mark.parametrize("member, expected", [
