@@ -24,7 +24,8 @@ def tags_beside(domain: mesh.Mesh, cell_tags: MeshTags, wall: Any) -> tuple[Mesh
 
     Soil slides along a wall where the friction and the adhesion between both are exceeded, usually two thirds of the strength of the
     soil. Where the cells beside the wall have a law of this strength, they yield first, and shear like an interface that is one cell
-    thick. The names of the soils stand for these cells too. Cells below the end of a line are none of them.
+    thick. The names of the soils stand for these cells too, and no longer for a tag that has lost all of its cells to a new one. Cells
+    below the end of a line are none of them.
 
     Args:
         domain: mesh of triangles, which follows the line as far as this is in it.
@@ -58,8 +59,11 @@ def tags_beside(domain: mesh.Mesh, cell_tags: MeshTags, wall: Any) -> tuple[Mesh
     result = mesh.meshtags(domain, dim, tagged, tags[tagged])
     result.name = cell_tags.name
     before = dict(zip(range(first, first + len(old)), old))
-    names = {
-        name: (*numbers, *(new for new, one in before.items() if one in numbers))
+    there = set().union(*comm.allgather(set(tags.tolist())))
+    names = {  # without tags of which all cells are beside the line
+        name: tuple(
+            n for n in (*numbers, *(new for new, one in before.items() if one in numbers)) if n in there or n not in old
+        )
         for name, numbers in names_of(cell_tags).items()
     }
     return name_tags(result, names), before

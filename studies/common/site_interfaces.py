@@ -69,7 +69,7 @@ def split_beside(
 
     Args:
         domain: the mesh; cell_tags: its tags.
-        laws: by cell tag; those of the new tags are added.
+        laws: by cell tag; those of the new tags are added, and those of tags without cells taken out.
         members: by name; fractions: interface strengths of walls among them.
 
     Returns:
@@ -82,6 +82,10 @@ def split_beside(
             if old in laws:
                 laws[new] = laws[old]
                 beside.walls[new] = (*beside.walls.get(old, ()), wall)
+        left = {tag for tags in bridge.names_of(cell_tags).values() for tag in tags}
+        for old in set(before.values()) - left:  # all of its cells are beside this wall
+            laws.pop(old, None)
+            beside.walls.pop(old, None)
     return cell_tags, beside
 
 

@@ -91,6 +91,20 @@ def test_without_stages_the_wall_and_its_interface_are_there_from_the_beginning(
     )
 
 
+def test_two_walls_in_one_place_leave_no_law_without_cells(tmp_path):
+    """All cells beside the short wall are beside the long one too."""
+    text = "[members.sheet]\nkind = 'beam'\npoints = [[5.0, 20.0], [5.0, 14.0]]\naxial_stiffness = 1e9\nbending_stiffness = 1e7\n"
+    walls = "interface_strength = 0.8\n[members.wall]\ninterface_strength = 0.5\n"
+    stages = "[[stages]]\nfill = ['ground', 'cut 1', 'cut 2', 'cut 3']\n[[stages]]\nname = 'first'\ninstall = ['sheet']\n[[stages]]\n"
+    site = site_in(tmp_path, text + walls + stages + "name = 'second'\nremove = ['sheet']\ninstall = ['wall']\n")
+    there = set(site.cell_tags.values.tolist())
+    assert set(site.laws) == set(site.tags_of(site.soils)) == there
+    assert all(set(stage.law) <= there for stage in site.stages)
+    both = [tag for tag in there if after(site, "first")[tag] != site.laws[tag]]
+    assert both and all(after(site, "first")[tag] == bridge.reduced_strength(site.laws[tag], 1 / 0.8) for tag in both)
+    assert all(after(site, "second")[tag] == bridge.reduced_strength(site.laws[tag], 2.0) for tag in both)
+
+
 def test_elastic_soil_beside_a_wall_has_no_strength_that_could_be_less(tmp_path):
     site = site_in(tmp_path, '[members.wall]\ninterface_strength = 0.5\n[soils."cut 3"]\nmaterial = "elastic"\n')
     laws = after(site, "wall")
