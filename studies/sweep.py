@@ -22,6 +22,7 @@ from typing import Any
 
 from common.checks import check_effect
 from common.figures import Pictures
+from common.files import PROGRAM
 from common.interrupt import Interrupt
 from common.options import add_count, add_flag, check, study_parser
 from common.page import Page
@@ -113,6 +114,12 @@ def parse(arguments: Sequence[str] | None = None) -> Namespace:
             not stray,
             f"{name} is given after the study, expected it before: each run has a folder of its own in that of the sweep",
         )
+    asked = next((word for word in a.run[1:] if word in ("-h", "--help")), None)
+    check(
+        p,
+        asked is None,
+        f"{asked} is given after the study, expected it without the sweep: {PROGRAM} {a.run[0]} --help",
+    )
     check(p, not a.resume or a.output is not None, "--resume is given, expected --output DIR with it")
     check(
         p, not (a.resume and a.overwrite), "--overwrite is given, expected it without --resume, which keeps the results"
@@ -223,8 +230,9 @@ def swept(a: Namespace, study: Study) -> int:
     rows = plan(variables, a.samples, dict(map(correlation_of, a.correlate)), a.seed, a.one_at_a_time)
     names, named = [one.name for one in variables], [*a.result, *limits]
     require_names(study, names)
-    kept = ended_before(a.output, rows, names, a.run) if a.resume else {}
-    folder = open_results(a, MPI.COMM_SELF, adds=a.resume)
+    resumed, a.resume = a.resume, False  # parameters.toml repeats the sweep from its beginning
+    kept = ended_before(a.output, rows, names, a.run) if resumed else {}
+    folder = open_results(a, MPI.COMM_SELF, adds=resumed)
     runs = runs_of(study, rows, folder)
     for run in runs:
         if run.number in kept:

@@ -101,7 +101,7 @@ def plan(
         InputError: a parameter that is there twice, distributions without a number of samples, or correlations that are not possible
             together.
     """
-    names = [one.name.replace("_", "-") for one in variables]
+    names = [_key(one.name) for one in variables]
     twice = next((one.name for k, one in enumerate(variables) if names[k] in names[:k]), None)
     if twice is not None:
         raise InputError(f"--vary names {twice} twice, expected each parameter once, with all of its values")
@@ -122,20 +122,25 @@ def _alone(variable: Variable) -> Sequence[Value]:
     return variable.values if variable.quantile is None else [_rounded(variable.quantile(tail)) for tail in TAILS]
 
 
+def _key(name: str) -> str:
+    """The name of a parameter, which may have dashes or underscores."""
+    return name.replace("_", "-")
+
+
 def _drawn(
     random: Sequence[Variable], samples: int, correlations: Mapping[tuple[str, str], float], seed: int
 ) -> list[Row]:
     if not random and not correlations:
         return [{}]
-    names = [one.name for one in random]
+    names, index = [one.name for one in random], {_key(one.name): k for k, one in enumerate(random)}
     correlation = np.eye(len(names))
     for (first, second), coefficient in correlations.items():
         for name in (first, second):
-            if name not in names:
+            if _key(name) not in index:
                 raise InputError(
                     f"--correlate names {name}, expected two parameters with distributions; these are {', '.join(names) or 'none'}"
                 )
-        i, j = names.index(first), names.index(second)
+        i, j = index[_key(first)], index[_key(second)]
         correlation[i, j] = correlation[j, i] = coefficient
     try:
         root = np.linalg.cholesky(correlation)

@@ -26,7 +26,7 @@ TABLE = "sweep.csv"
 """Table of all runs"""
 FEW_RESULTS = 4
 """Results that are drawn where none is named"""
-NOT_DRAWN = ("seconds", "steps", "iterations", "cells", "particles", "nodes", "failed", "ranks")
+NOT_DRAWN = ("seconds", "steps", "iterations", "cells", "particles", "nodes", "failed", "ranks", "out_of_balance")
 """Parts of names of results that say how a run was computed"""
 QUANTILES = (0.05, 0.5, 0.95)
 

@@ -36,6 +36,7 @@ def test_a_sweep_of_strength_gives_the_peaks_of_mohr_and_coulomb_and_goes_on(tmp
     assert first.returncode == 0, first.stderr
     times = {row["run"]: row["seconds"] for row in table(folder)}
     more = ended("sweep", tmp_path, *words, "--samples", "3", "--resume", *run)
+    assert "resume = false" in (folder / "parameters.toml").read_text()  # which repeats it in a new folder
     assert more.returncode == 0 and "3 runs of element_test, of which 2 are there" in more.stdout
     rows = table(folder)
     assert [row["run"] for row in rows] == ["1", "2", "3"] and all(
@@ -101,6 +102,7 @@ def study_site():
     (["--vary", "cohesion=1,2"], "no study is named"),
     (["--vary", "cohesion=1,2", "element_test", "--output=there"], "--output is given after the study, expected it before"),
     (["element_test"], "--vary is not given"),
+    (["--vary", "cohesion=1,2", "element_test", "--help"], "--help is given after the study, expected it without the sweep"),
     (["--vary", "cohesion=1,2", "elements_test"], "there is no study 'elements_test'"),
     (["--vary", "cohesin=1,2", "element_test"], "which is no option of element_test; did you mean cohesion?"),
     (["--vary", "soils.a.young=1,2", "safety"], "a key of a site, expected --site FILE"),

@@ -11,6 +11,7 @@ from common.sweep_maps import hazard_maps
 from common.sweep_plan import correlation_of, plan, variable_of
 from common.sweep_results import (
     changes_alone,
+    drawn_results,
     ended_before,
     probability_below,
     rank_correlations,
@@ -78,6 +79,8 @@ def test_lognormal_values_have_the_mean_and_the_deviation_that_are_given():
 def test_correlated_samples_keep_their_distributions():
     variables = [variable_of("c=normal:10:2"), variable_of("phi=uniform:20:30")]
     rows = plan(variables, 4000, {("c", "phi"): -0.5})
+    both = [variable_of("c=normal:10:2"), variable_of("friction-angle=uniform:20:30")]
+    assert column(plan(both, 4000, {("c", "friction_angle"): -0.5}), "friction-angle") == pytest.approx(column(rows, "phi"))
     c, phi = column(rows, "c"), column(rows, "phi")
     scores = stats.norm.ppf((phi - 20) / 10)
     assert np.corrcoef(c, scores)[0, 1] == pytest.approx(-0.5, abs=0.02)
@@ -259,6 +262,11 @@ def test_a_sweep_goes_on_where_results_have_the_names_of_parameters(tmp_path):
         InputError, match="are of 'slope --time 5', not of 'slope'; expected the same study and options"
     ):
         ended_before(tmp_path, rows, names, ["slope"])
+
+
+def test_how_well_a_run_is_in_balance_is_not_drawn():
+    runs = [run(k, {}, initial_out_of_balance_ratio=1e-9 * k, runout_m=float(k)) for k in (1, 2)]
+    assert drawn_results(runs, []) == ["runout_m"]
 
 
 def test_of_several_sites_the_last_one_counts():
