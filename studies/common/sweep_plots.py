@@ -55,6 +55,7 @@ def _curves(
     with curve_figure(path, (4.9, 3.3)) as axes:
         for k, group in enumerate(groups):
             mine = [run for run in runs if not other or run.values[other[0].name] == group]
+            mine = in_order(mine, along.name)
             x, y = column([run.values[along.name] for run in mine]), values_of(mine, result)
             text = f"{names[other[0].name]}: {_shown(group)}" if other else None
             axes.plot(x, y, "o-", color=COLOURS[k % len(COLOURS)], markersize=3, linewidth=1.1, label=text)
@@ -62,6 +63,12 @@ def _curves(
         _draw_mark(axes.axhline, mark)
         if other or mark is not None:
             axes.legend(fontsize=8)
+
+
+def in_order(runs: Sequence[Run], name: str) -> list[Run]:
+    """Runs in the order of the values of a parameter, whose list may have them in any; of texts in that of the list."""
+    values = column([run.values[name] for run in runs])
+    return list(runs) if values.dtype.kind == "U" else [runs[k] for k in np.argsort(values, kind="stable")]
 
 
 def _points(

@@ -9,6 +9,7 @@ import study_main  # noqa: F401
 from common.site_tables import merged
 from common.sweep_maps import hazard_maps
 from common.sweep_plan import correlation_of, plan, variable_of
+from common.sweep_plots import in_order
 from common.sweep_results import (
     changes_alone,
     drawn_results,
@@ -80,7 +81,9 @@ def test_correlated_samples_keep_their_distributions():
     variables = [variable_of("c=normal:10:2"), variable_of("phi=uniform:20:30")]
     rows = plan(variables, 4000, {("c", "phi"): -0.5})
     both = [variable_of("c=normal:10:2"), variable_of("friction-angle=uniform:20:30")]
-    assert column(plan(both, 4000, {("c", "friction_angle"): -0.5}), "friction-angle") == pytest.approx(column(rows, "phi"))
+    assert column(plan(both, 4000, {("c", "friction_angle"): -0.5}), "friction-angle") == pytest.approx(
+        column(rows, "phi")
+    )
     c, phi = column(rows, "c"), column(rows, "phi")
     scores = stats.norm.ppf((phi - 20) / 10)
     assert np.corrcoef(c, scores)[0, 1] == pytest.approx(-0.5, abs=0.02)
@@ -262,6 +265,12 @@ def test_a_sweep_goes_on_where_results_have_the_names_of_parameters(tmp_path):
         InputError, match="are of 'slope --time 5', not of 'slope'; expected the same study and options"
     ):
         ended_before(tmp_path, rows, names, ["slope"])
+
+
+def test_curves_go_through_values_in_their_order():
+    runs = [run(k, {"x": x, "kind": kind}) for k, (x, kind) in enumerate([(3.0, "P2"), (1, "P1"), (2.5, "P3")])]
+    assert [one.values["x"] for one in in_order(runs, "x")] == [1, 2.5, 3.0]
+    assert in_order(runs, "kind") == runs
 
 
 def test_how_well_a_run_is_in_balance_is_not_drawn():
