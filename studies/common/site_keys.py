@@ -11,7 +11,7 @@ import mpm_core as mpm
 from fenics_bridge import water
 
 from .parameters import unknown_key
-from .site_laws import is_number, law_keys, located
+from .site_laws import STRENGTHS, is_number, law_keys, located
 from .site_tables import MOST_FILES, merged, parsed
 
 DAY = 86400.0
@@ -115,6 +115,11 @@ def _extended(path: Path, depth: int = 1) -> dict[str, Any]:
         below["mesh"] = str(folder.resolve() / str(below["mesh"]))
     for key in ("soils", "laws"):
         below[key] = {name: located(law, folder.resolve()) for name, law in below.get(key, {}).items()}
+        for name in below[key]:
+            given = table.get(key, {}).get(name, {})
+            for one, other in (STRENGTHS, STRENGTHS[::-1]):
+                if one in given and other not in given:
+                    below[key][name].pop(other, None)
     return merged(below, table)
 
 

@@ -19,6 +19,10 @@ from .slope_case import add_soil_options
 from .soils import add_law_options, law_of
 
 
+STRENGTHS = ("cohesion", "shear_strength")
+"""Parameters of which a law has one; in a site that extends another, one of them takes the place of the other"""
+
+
 @cache
 def _parser() -> argparse.ArgumentParser:
     parser = study_parser(None)
@@ -58,6 +62,10 @@ def law_at(table: dict, height: float | None, where: str) -> Any:
         height: None for a law without such parameters.
         where: the table stands, for messages.
     """
+    if all(name in table for name in STRENGTHS):
+        raise mpm.InputError(
+            f"{where} has {' and '.join(STRENGTHS)}, expected one of them: the latter stands for the former"
+        )
     values = vars(_parser().parse_args([]))
     place = "" if height is None else f", at a height of {height:.4g} m"
     try:

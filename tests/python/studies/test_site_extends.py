@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 import study_main  # noqa: F401
 from common.site_keys import read_site_table
+from common.site_laws import law_at
 from common.site_tables import MOST_FILES, site_files
 
 from mpm_core import InputError
@@ -91,3 +92,22 @@ def test_a_wrong_key_is_that_of_the_file_that_has_it(tmp_path, base):
     variant = written(tmp_path / "variant.toml", 'extends = "base/site.toml"\n')
     with pytest.raises(InputError, match=r"base/site.toml: soils.clay: unknown key 'unit_wieght'"):
         read_site_table(variant)
+
+
+def test_one_strength_takes_the_place_of_the_other(tmp_path):
+    """Otherwise the cohesion of a variant, or of a sweep, would have no effect on clay with a shear strength."""
+    path = tmp_path / "site.toml"
+    path.write_text(
+        f'extends = "{Path(__file__).parents[3] / "meshes" / "embankment.toml"}"\nsoils.clay.cohesion = 5e3\n'
+    )
+    clay = read_site_table(path)["soils"]["clay"]
+    assert clay["cohesion"] == 5e3 and "shear_strength" not in clay
+    other = tmp_path / "other.toml"
+    other.write_text('extends = "site.toml"\nsoils.clay.shear_strength = 7e3\n')
+    clay = read_site_table(other)["soils"]["clay"]
+    assert clay["shear_strength"] == 7e3 and "cohesion" not in clay
+
+
+def test_two_strengths_of_one_soil_are_refused():
+    with pytest.raises(InputError, match="soils.clay has cohesion and shear_strength, expected one of them"):
+        law_at({"young": 5e6, "cohesion": 5e3, "shear_strength": 7e3}, None, "soils.clay")
