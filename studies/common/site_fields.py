@@ -23,7 +23,7 @@ from .parameters import unknown_key
 from .site_laws import is_number, is_profile
 
 KEYS = ("value", "per_metre", "top", "variation", "lengths", "seed", "correlation", "lognormal")
-STRENGTHS = {"cohesion": "cohesion", "shear_strength": "cohesion", "friction_angle": "friction_angle"}
+RANDOM = {"cohesion": "cohesion", "shear_strength": "cohesion", "friction_angle": "friction_angle"}
 """Parameters that may be random fields, and what their laws call them"""
 
 
@@ -61,15 +61,15 @@ def fields_of(soil: str, parameters: Mapping[str, Any], dim: int, where: str) ->
         if not isinstance(given, dict) or not {"variation", "lengths"} & set(given):
             continue
         here = f"{where}: {name}"
-        if name not in STRENGTHS:
-            raise mpm.InputError(f"{here} is a random field, expected one of {', '.join(STRENGTHS)} only")
+        if name not in RANDOM:
+            raise mpm.InputError(f"{here} is a random field, expected one of {', '.join(RANDOM)} only")
         for key in given:
             if key not in KEYS:
                 raise mpm.InputError(f"{here}: {unknown_key(key, KEYS)}")
         profile = {key: given[key] for key in ("value", "per_metre", "top") if key in given}
         if not (is_number(given.get("value")) and (set(profile) == {"value"} or is_profile(profile))):
             raise mpm.InputError(f"{here} is {given}, expected value, or value, per_metre and top, of a random field")
-        fields.append(SoilField(soil, STRENGTHS[name], _mean(profile), _relative(given, dim, here)))
+        fields.append(SoilField(soil, RANDOM[name], _mean(profile), _relative(given, dim, here)))
         numbers[name] = float(given["value"])
     return fields, numbers
 

@@ -71,7 +71,7 @@ def test_the_factor_of_safety_follows_the_field_and_its_picture_is_drawn(tmp_pat
 def test_the_law_of_undrained_soil_keeps_its_pore_water(tmp_path):
     clay = "undrained = true\nporosity = 0.5\nmaterial = 'mohr-coulomb'\nfriction_angle = 25.0\n"
     clay += "cohesion = {value = 3e3, variation = 0.2, lengths = [5, 1]}\n"
-    site = read_site(site_in(tmp_path, clay + "young = 3e6\nshear_strength = 3e3"), MPI.COMM_WORLD)
+    site = read_site(site_in(tmp_path, clay + "young = 3e6"), MPI.COMM_WORLD)
     law = site.laws[site.tags_of(["clay"])[0]]
     assert isinstance(law, mpm.Undrained) and law.porosity == 0.5
     assert isinstance(law.skeleton, mpm.Heterogeneous) and law.skeleton.varying == ["cohesion"]
