@@ -158,10 +158,8 @@ def limits_of(words: Sequence[str]) -> dict[str, float]:
 # --- 2. All runs -----------------------------------------------------------------------------------------------------
 
 
-def make_all(
-    runs: list[Run], study: Study, folder: Path, names: Sequence[str], named: Sequence[str], jobs: int
-) -> bool:
-    """Make the runs that have not ended yet, with the table of those that have; returns whether this was interrupted.
+def make_all(runs: list[Run], study: Study, folder: Path, names: Sequence[str], named: Sequence[str], jobs: int) -> int:
+    """Make the runs that have not ended yet, with the table of those that have; returns the exit code of an interruption, or 0.
 
     Args:
         names: of the parameters.
@@ -182,7 +180,7 @@ def make_all(
             progress.show(len(runs) - len(waiting) + done, done, **({"failed": str(failed)} if failed else {}))
         if refusals:
             raise InputError(refusals[0])
-        return interrupt.requested()
+        return interrupt.exit_code
 
 
 def refusal(run: Run, named: Sequence[str]) -> list[str]:
@@ -248,7 +246,8 @@ def swept(a: Namespace, study: Study) -> int:
     labels = {name: _with_unit(name, {**law_units(), **study.units}) for name in names}
     marks = {name: ("limit", limit) for name, limit in limits.items()}
     draw = {name: picture_of(runs, variables, name, labels, a.one_at_a_time, marks.get(name)) for name in shown}
-    return finish(a, folder, study, runs, results, draw, said(runs, results), hazard_maps(runs, folder))
+    code = finish(a, folder, study, runs, results, draw, said(runs, results), hazard_maps(runs, folder))
+    return interrupted or code
 
 
 def back_analysis(a: Namespace, study: Study) -> int:
@@ -262,13 +261,13 @@ def back_analysis(a: Namespace, study: Study) -> int:
             return [math.nan] * len(values)  # which ends the search
         new = runs_of(study, [{wanted.name: value} for value in values], folder, len(runs) + 1)
         runs.extend(new)
-        if make_all(runs, study, folder, [wanted.name], [wanted.result], jobs(a)):
-            interrupted.append("it was interrupted")
+        if code := make_all(runs, study, folder, [wanted.name], [wanted.result], jobs(a)):
+            interrupted.append(code)
         return [run.result(wanted.result) for run in new]
 
     found = find_value(wanted, results_at)
     label_of = _with_unit(wanted.name, {**law_units(), **study.units})
-    reason = "".join(interrupted) or found.reason
+    reason = "it was interrupted" if interrupted else found.reason
     results: dict[str, Any] = {
         "parameter": wanted.name,
         "value": found.value if math.isfinite(found.value) else None,
@@ -282,7 +281,8 @@ def back_analysis(a: Namespace, study: Study) -> int:
         runs, [Variable(wanted.name)], wanted.result, {wanted.name: label_of}, False, ("target", wanted.target)
     )
     text = f"{label_of} of {found.value:.4g}: {label(wanted.result)} {found.result:.4g}, after {len(runs)} runs"
-    return finish(a, folder, study, runs, results, {wanted.result: draw}, text, {})
+    code = finish(a, folder, study, runs, results, {wanted.result: draw}, text, {})
+    return interrupted[0] if interrupted else code
 
 
 def finish(

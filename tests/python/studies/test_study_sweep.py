@@ -6,6 +6,7 @@ import json
 import math
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -171,3 +172,28 @@ def until(condition, seconds=30.0):
     while not condition():
         assert time.monotonic() < end
         time.sleep(0.05)
+
+
+def test_an_interrupted_sweep_keeps_what_has_ended_and_says_so_by_its_exit_code(tmp_path, without_pictures):
+    folder = tmp_path / "s"
+    words = [
+        "sweep.py",
+        "--vary",
+        "young=1e5:2e5:50",
+        "--jobs",
+        "1",
+        "--output",
+        folder,
+        "element_test",
+        "--steps",
+        "5",
+    ]
+    command = [sys.executable, STUDIES / words[0], *words[1:]]
+    child = subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    limit = time.monotonic() + 120
+    while not (folder / "runs" / "001" / "summary.json").exists() and time.monotonic() < limit:
+        time.sleep(0.1)
+    child.send_signal(signal.SIGINT)
+    assert child.wait(timeout=60) == 128 + signal.SIGINT
+    summary = json.loads((folder / "summary.json").read_text())
+    assert 1 <= summary["runs_with_results"] < 50 and "--resume --output" in summary["stopped_because"]

@@ -102,10 +102,10 @@ def test_a_search_that_is_interrupted_makes_no_further_run(tmp_path, without_pic
         for run in runs:
             run.code, run.numbers = run.code or 0, {"y": run.values["cohesion"]}
         calls.append(len(runs))
-        return True
+        return 130  # of Ctrl-C
 
     calls = []
     monkeypatch.setattr(sweep, "make_all", made)
     a = sweep.parse(["--find", "cohesion=1:4", "--target", "y=2", "--output", str(tmp_path / "s"), "element_test"])
-    assert sweep.back_analysis(a, sweep.study_named(a)) == 1 and calls == [2]
+    assert sweep.back_analysis(a, sweep.study_named(a)) == 130 and calls == [2]
     assert json.loads((tmp_path / "s" / "summary.json").read_text())["stopped_because"] == "it was interrupted"
