@@ -108,10 +108,10 @@ def parse(arguments: Sequence[str] | None = None) -> Namespace:
         "no --find",
     )
     for name in ("--output", "--overwrite"):
-        stray = any(word.split("=")[0] == name for word in a.run[1:])
+        after = any(word.split("=")[0] == name for word in a.run[1:])
         check(
             p,
-            not stray,
+            not after,
             f"{name} is given after the study, expected it before: each run has a folder of its own in that of the sweep",
         )
     asked = next((word for word in a.run[1:] if word in ("-h", "--help")), None)
