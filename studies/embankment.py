@@ -25,6 +25,7 @@ from common.page import Page
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
+from common.site_field_plots import random_pictures
 from common.site_file import Site, read_site
 from common.site_slides import add_strength_factor
 from common.stage_runs import add_stage_options, carry_out
@@ -62,16 +63,18 @@ def build(
 ) -> tuple[bridge.ParticleSite, str | None]:
     """Particles after all stages, and why they ended early if they did; weaker laws are there for the slide. Collective.
 
-    Where stages install structural members the particles begin from the finite elements, `staged`: quasi-static ones have none.
+    Where stages install structural members, or strengths are random fields, the particles begin from the finite elements, `staged`:
+    quasi-static ones of their own have none.
     """
     model, materials = site.model(site.weaker_laws(factor) if factor > 1 else ())
     particles = bridge.ParticleSite(
         model, materials, site.supports, per_cell=per_cell, small_displacements=True, nmd=nmd
     )
-    if site.members and staged is not None:
+    if begins_from_elements(site) and staged is not None:
         handover = particles.take_over(staged)
+        has = " and ".join(["the structural members"] * bool(site.members) + ["the random fields"] * bool(site.random))
         say(
-            f"the particles begin from the finite elements, which have the structural members; out-of-balance ratio {handover.unbalanced_ratio:.1e}"
+            f"the particles begin from the finite elements, which have {has}; out-of-balance ratio {handover.unbalanced_ratio:.1e}"
         )
         return particles, None
     try:
@@ -83,6 +86,11 @@ def build(
     except bridge.StageError as error:
         return particles, str(error)
     return particles, None
+
+
+def begins_from_elements(site: Site) -> bool:
+    """Whether a site has what quasi-static particles cannot have in their own stages."""
+    return bool(site.members or site.random)
 
 
 def stress_difference(particles: bridge.ParticleSite, staged: bridge.FemSite) -> float:
@@ -127,19 +135,18 @@ def main(arguments: list[str] | None = None) -> int:
     a = parser().parse_args(arguments)
     start = perf_counter()
     site = read_site(a.site, comm, a.cell_size, needed=("stages",))
-    site.require_no_fields(a.site)
     folder = open_results(a, comm)
     degree, averaged = int(a.elements[1]), site_slides.averages(a, site.laws.values())
     nmd = averaged and degree == 1
-    run = carry_out(site, degree, folder, comm, nmd=nmd, as_particles=nmd and bool(site.members))
+    run = carry_out(site, degree, folder, comm, nmd=nmd, as_particles=nmd and begins_from_elements(site))
     failed, rows = run.stopped, run.rows
     built = perf_counter()
     particles, failed_particles = build(site, a.particles_per_cell, a.factor, averaged, run.site)
-    own_stages = not (failed or failed_particles or site.members)
+    own_stages = not (failed or failed_particles or begins_from_elements(site))
     apart = stress_difference(particles, run.site) if own_stages else None
     model = particles.model
     model.particles.set("initial_position", model.particles.position)
-    factor = 1.0 if failed_particles or (failed and site.members) else a.factor
+    factor = 1.0 if failed_particles or (failed and begins_from_elements(site)) else a.factor
     weaken(site, model, factor)
     scene = scene_of(model, sorted(site.laws))
     with Interrupt(comm) as interrupt:
@@ -157,6 +164,7 @@ def main(arguments: list[str] | None = None) -> int:
     drawn = {
         **(run.drawn(site.stages, folder) if a.pictures else {}),
         **site_slides.slide_pictures(a, result, scene, folder),
+        **(random_pictures(site, run.site.fem, folder) if a.pictures else {}),
     }
     slide = f"strength divided by {factor:g}" if factor > 1 else "full strength"
     movie = [particle_movie(slide, scene, result.frames)]

@@ -149,8 +149,8 @@ class Site:
         """Raise InputError for random fields in the file of a study that has none."""
         if self.random:
             one = self.random[0]
-            raise mpm.InputError(f"{path}: soils.{one.soil}: {one.parameter} is a random field; the studies safety, collapse, excavation "
-                                 "and slope have them")  # fmt: skip
+            raise mpm.InputError(f"{path}: soils.{one.soil}: {one.parameter} is a random field; the studies safety, collapse, excavation, "
+                                 "embankment and slope have them")  # fmt: skip
 
     def left_out_at_once(self) -> str:
         """A warning of what stages change beside placing soils, for a study that has all soils at once; else no text."""

@@ -1,5 +1,6 @@
 """Random fields of the soils of a site: their values at points and particles, and what is refused."""
 
+import importlib
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from common.site_field_plots import random_pictures
 from common.site_file import read_site
 from mpi4py import MPI
 
+import fenics_bridge as bridge
 import mpm_core as mpm
 
 SITE = Path(__file__).parents[3] / "meshes" / "embankment.toml"
@@ -68,6 +70,27 @@ def test_the_factor_of_safety_follows_the_field_and_its_picture_is_drawn(tmp_pat
     assert (tmp_path / "1" / "random_cohesion.png").stat().st_size > 10_000
 
 
+def test_particles_of_an_embankment_begin_with_the_field_and_slide_with_less_of_it(tmp_path, without_pictures):
+    """Those of linear elements on the same cells have the values of the elements' points, which are the cells' centroids."""
+    embankment = importlib.import_module("embankment")
+    site = read_site(site_in(tmp_path, f"shear_strength = {FIELD.replace('12e3', '24e3')}"), MPI.COMM_WORLD)
+    fem = bridge.FemSite(site.finite_elements(1, nmd=True, as_particles=True))
+    for _ in bridge.carry_out(fem, site.stages):
+        pass
+    particles, failed = embankment.build(site, 3, 1.5, True, fem)
+    assert failed is None
+    model = particles.model
+    p, strength = model.particles, model.parameter("cohesion")
+    clay = particles.rows_of("clay")
+    corners = np.array([model.mesh.points[cell] for cell in model.mesh.cells[p.cell[clay]]])
+    field = mpm.RandomField(mean=1.0, deviation=0.4, lengths=[8.0, 1.0], seed=3, lognormal=True, correlation="markov")
+    centre = corners.mean(axis=1)
+    assert strength[clay] == pytest.approx((24e3 + 2e3 * (3.0 - centre[:, 1])) * field(centre), rel=1e-9)
+    embankment.weaken(site, model, 1.5)
+    assert model.laws[p.material[clay][0]] in site.weaker_laws(1.5)
+    assert model.parameter("cohesion")[clay] == pytest.approx(strength[clay], rel=1e-12)
+
+
 def test_the_law_of_undrained_soil_keeps_its_pore_water(tmp_path):
     clay = "undrained = true\nporosity = 0.5\nmaterial = 'mohr-coulomb'\nfriction_angle = 25.0\n"
     clay += "cohesion = {value = 3e3, variation = 0.2, lengths = [5, 1]}\n"
@@ -96,8 +119,12 @@ def test_impossible_fields_are_refused_by_name(tmp_path, clay, message):
 
 
 def test_studies_without_random_fields_refuse_them(tmp_path):
-    end = study_main.ended("embankment", tmp_path / "out", "--site", site_in(tmp_path, f"shear_strength = {FIELD}"))
-    assert end.returncode == 2 and "soils.clay: cohesion is a random field; the studies safety" in end.stderr
+    site = tmp_path / "site.toml"
+    site.write_text(
+        f'extends = "{SITE.with_name("fill.toml")}"\n[soils.soil]\nmaterial = "tresca"\nshear_strength = {FIELD}\n'
+    )
+    end = study_main.ended("consolidation", tmp_path / "out", "--site", site)
+    assert end.returncode == 2 and "soils.soil: cohesion is a random field; the studies safety" in end.stderr
 
 
 def test_a_site_without_random_fields_has_no_picture_of_one(tmp_path):
