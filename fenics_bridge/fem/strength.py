@@ -70,19 +70,35 @@ def davis_strength(law: Laws) -> Laws:
     Sloan 2015, Comput. Geotech. 70, 178-189).
 
     Args:
-        law: MohrCoulomb, or laws by cell tag, of which others stay as they are.
+        law: MohrCoulomb, or one that is Heterogeneous in anything but its angles; or laws by cell tag, of which others stay as they are.
 
     Raises:
-        InputError: law is another one.
+        InputError: law is another one, or its angles vary from point to point.
     """
     if isinstance(law, dict):
-        return {tag: davis_strength(one) if isinstance(one, mpm.MohrCoulomb) else one for tag, one in law.items()}
-    if not isinstance(law, mpm.MohrCoulomb):
+        return {tag: davis_strength(one) if _is_mohr_coulomb(one) else one for tag, one in law.items()}
+    if not _is_mohr_coulomb(law):
         raise InputError(f"law is {type(law).__name__}, expected MohrCoulomb")
-    phi, psi = math.radians(law.friction_angle), math.radians(law.dilation_angle)
-    factor = (1 - math.sin(psi) * math.sin(phi)) / (math.cos(psi) * math.cos(phi))
-    friction = _divided(law.friction_angle, factor)
-    return _mohr_coulomb(law, law.cohesion / factor, friction, friction)
+    if not isinstance(law, mpm.Heterogeneous):
+        factor = _davis_factor(law.friction_angle, law.dilation_angle)
+        friction = _divided(law.friction_angle, factor)
+        return _mohr_coulomb(law, law.cohesion / factor, friction, friction)
+    angle = next((name for name in law.varying if name.endswith("_angle")), None)
+    if angle is not None:
+        raise InputError(
+            f"law is Heterogeneous in {angle}, expected the same angles at all points for the strength of Davis"
+        )
+    one, reduced = law.law, law.strength_factor
+    friction = _divided(one.friction_angle, reduced)
+    factor = _davis_factor(friction, min(one.dilation_angle, friction))
+    associated = _mohr_coulomb(one, one.cohesion, one.friction_angle, one.friction_angle)
+    return reduced_strength(mpm.Heterogeneous(associated, law.varying), reduced * factor)
+
+
+def _davis_factor(friction_angle: float, dilation_angle: float) -> float:
+    """What cohesion and tan(friction angle) are divided by, for angles [degrees]."""
+    phi, psi = math.radians(friction_angle), math.radians(dilation_angle)
+    return (1 - math.sin(psi) * math.sin(phi)) / (math.cos(psi) * math.cos(phi))
 
 
 def davis_reduced_strength(law: Laws, factor: float, unreduced: Collection[int | str] = ()) -> Laws:
@@ -103,6 +119,10 @@ def davis_reduced_strength(law: Laws, factor: float, unreduced: Collection[int |
         InputError: as for `reduced_strength` and `davis_strength`.
     """
     return davis_strength(reduced_strength(law, factor, unreduced))
+
+
+def _is_mohr_coulomb(law: Any) -> bool:
+    return isinstance(law.law if isinstance(law, mpm.Heterogeneous) else law, mpm.MohrCoulomb)
 
 
 def _divided(angle: Any, factor: float) -> Any:

@@ -100,13 +100,16 @@ class Site:
             geometry=self.geometry,
             **options,
         )
-        soils = np.array(list(laws or self.laws))  # in the order of the laws
-        of_point = np.repeat(soils[fem.points.material], fem.points.per_cell)
-        for name, values in values_of(self.random, fem.points.coordinates(), of_point, self.tags_of).items():
-            fem.set_parameter(name, values)
+        self.vary(fem, laws or self.laws)
         if self.members and not self.stages:
             fem.reconfigure(members=self.members)
         return fem
+
+    def vary(self, fem: bridge.QuasiStatic, laws: dict[int, Any]) -> None:
+        """Give the points of elements with these laws by cell tag the values of random fields. Collective."""
+        of_point = np.repeat(np.array(list(laws))[fem.points.material], fem.points.per_cell)
+        for name, values in values_of(self.random, fem.points.coordinates(), of_point, self.tags_of).items():
+            fem.set_parameter(name, values)
 
     def body(self) -> tuple[Any, Any, Any]:
         """Domain, cell tags and facet tags of the soils alone. Collective."""
@@ -150,7 +153,7 @@ class Site:
         if self.random:
             one = self.random[0]
             raise mpm.InputError(f"{path}: soils.{one.soil}: {one.parameter} is a random field; the studies safety, collapse, excavation, "
-                                 "embankment and slope have them")  # fmt: skip
+                                 "embankment, drawdown, rain and slope have them")  # fmt: skip
 
     def left_out_at_once(self) -> str:
         """A warning of what stages change beside placing soils, for a study that has all soils at once; else no text."""

@@ -88,6 +88,7 @@ class SlopeSite:
         fem = bridge.QuasiStatic(
             domain, laws or site.laws, facet_tags, site.supports, degree, cell_tags=cell_tags, **options
         )
+        site.vary(fem, laws or site.laws)
         fem.reconfigure(pore_pressure=pore_pressure)
         return fem
 
@@ -131,7 +132,6 @@ def read_slope_site(path: Path, comm: MPI.Comm, cell_size: float | None = None, 
     warn_of_members(table, path)
     boundary = [_slower(one, slower) for one in boundary_of(table, path).values()]
     site = site_of(effective_laws(table), path, comm, cell_size, interfaces=False)
-    site.require_no_fields(path)
     body = site.body()
     warn_of_reservoirs(body[0], boundary, path)
     warn_of_flooded_ground(body[0], body[2], boundary, path)

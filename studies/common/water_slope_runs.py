@@ -22,6 +22,7 @@ from .page import Page
 from .quiet import NOT_REACHED, without_warning
 from .results import open_results
 from .site_doubts import ends_of_height, warn_of_suction
+from .site_field_plots import random_pictures
 from .site_slides import CAPTIONS as SLIDE_CAPTIONS
 from .slope_site import SlopeSite, read_slope_site
 from .summary import write_summary
@@ -53,6 +54,9 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
     """
     start = perf_counter()
     slope = read_slope_site(a.site, comm, a.cell_size, a.slower)
+    if a.davis and any(field.parameter == "friction_angle" for field in slope.site.random):
+        raise mpm.InputError(f"{a.site}: friction_angle is a random field, expected --no-davis with it: the strength of Davis needs the same "
+                             "angles in all of a soil")  # fmt: skip
     if not any(isinstance(condition, changing) for condition in slope.boundary):
         raise mpm.InputError(f"{a.site}: no boundary has {changing.__name__.lower()}, expected one or more")
     if a.slide and a.slide_water == "flows":
@@ -92,6 +96,8 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
         )
     lines += filter(None, [rests_all_the_same(a, slope, summary)])
     drawn = (slope_pictures(folder, instants, values, slope.body[1], a.film) | pictures) if a.pictures else {}
+    if a.pictures and slope.site.random:
+        drawn |= random_pictures(slope.site, slope.elements(1, lambda points: np.zeros(len(points))), folder)
     early = write_summary(folder, a, summary, comm, page, drawn, said="\n".join(lines))
     return early or code or (0 if shown else UNDECIDED)
 

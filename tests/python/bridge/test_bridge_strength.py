@@ -204,6 +204,25 @@ def test_laws_of_unknown_strength_are_refused_with_advice():
             bridge.reduced_strength(law, 1.0)
 
 
+def test_strength_of_davis_of_soil_whose_cohesion_varies_is_that_of_each_point():
+    law = sand(dilation_angle=5.0)
+    varying = mpm.Heterogeneous(law, ["cohesion"])
+    strain = np.array([[-1e-3, 2e-3, 0.0, 1e-3]] * 2)
+    for factor in (1.0, 1.3):
+        reduced = bridge.davis_reduced_strength(varying, factor)
+        for k, cohesion in enumerate((law.cohesion, 3 * law.cohesion)):
+            alone = bridge.davis_reduced_strength(sand(dilation_angle=5.0, cohesion=cohesion), factor)
+            stress, expected = np.full((1, 4), -10.0), np.full((1, 4), -10.0)
+            stress[:, 3] = expected[:, 3] = 0.0
+            state = np.zeros((1, reduced.n_state))
+            state[:, -1] = cohesion - law.cohesion
+            reduced.update(strain[k : k + 1], stress, state)
+            alone.update(strain[k : k + 1], expected, np.zeros((1, alone.n_state)))
+            assert stress == pytest.approx(expected, rel=1e-12)
+    with pytest.raises(bridge.InputError, match="law is Heterogeneous in friction_angle, expected the same angles"):
+        bridge.davis_strength({1: mpm.Heterogeneous(law, ["friction_angle"])})
+
+
 def test_strength_of_davis():
     """Without dilation c* = c cos(phi), tan(phi*) = sin(phi); with associated flow nothing changes."""
     davis = bridge.davis_strength(sand(dilation_angle=0.0))

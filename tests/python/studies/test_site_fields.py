@@ -1,6 +1,7 @@
 """Random fields of the soils of a site: their values at points and particles, and what is refused."""
 
 import importlib
+import re
 from pathlib import Path
 
 import numpy as np
@@ -116,6 +117,35 @@ def test_the_law_of_undrained_soil_keeps_its_pore_water(tmp_path):
 def test_impossible_fields_are_refused_by_name(tmp_path, clay, message):
     with pytest.raises(mpm.InputError, match=f"soils.clay: .*{message}"):
         read_site(site_in(tmp_path, clay), MPI.COMM_WORLD)
+
+
+DRAWDOWN = "--cell-size 3 --elements P1 --days 1 --factor-times 1 --no-pictures".split()
+
+
+def drawn_down(folder, bank, *options):
+    """How the study drawdown of its site with other keys of the bank ends, and its lowest factor of safety."""
+    folder.mkdir()
+    site = folder / "site.toml"
+    site.write_text(f'extends = "{SITE.with_name("drawdown.toml")}"\n[soils.bank]\n{bank}\n')
+    end = study_main.ended("drawdown", folder / "out", "--site", site, *DRAWDOWN, *options)
+    lowest = re.search(r"lowest factor of safety ([\d.]+)", end.stdout)
+    return end, float(lowest[1]) if lowest else None
+
+
+def test_a_drawdown_has_the_field_with_the_strength_of_davis(tmp_path):
+    fields = [
+        f"cohesion = {{value = 4e3, variation = {v}, lengths = [10.0, 2.0], seed = {seed}}}"
+        for v, seed in ((0.0, 1), (0.6, 1), (0.6, 2))
+    ]
+    found = [drawn_down(tmp_path / str(k), bank)[1] for k, bank in enumerate(["cohesion = 4e3", *fields])]
+    assert found[1] == found[0] and abs(found[2] - found[3]) > 0.01
+
+
+def test_a_friction_angle_that_varies_has_no_strength_of_davis(tmp_path):
+    bank = "friction_angle = {value = 27.0, variation = 0.1, lengths = [10.0, 2.0]}"
+    end, _ = drawn_down(tmp_path / "davis", bank)
+    assert end.returncode == 2 and "friction_angle is a random field, expected --no-davis" in end.stderr
+    assert drawn_down(tmp_path / "plain", bank, "--no-davis")[1] > 1
 
 
 def test_studies_without_random_fields_refuse_them(tmp_path):
