@@ -41,9 +41,11 @@ def test_warnings_that_a_study_leaves_out_are_those_of_the_core():
 
 def test_round_off_of_an_inflow_is_nothing():
     inflows = {"upstream": 0.5, "downstream": -0.5, "crest": 1.9e-20}
-    litres = importlib.import_module("seepage").litres
-    assert [litres(value, inflows) for value in inflows.values()] == [500, -500, 0]
-    assert litres(0.0, {"crest": 0.0}) == 0
+    discharge = importlib.import_module("common.discharge")
+    shown = discharge.in_words(inflows, discharge.PLANE)
+    assert [text.split()[0] for text in shown.values()] == ["500", "-500", "0"]
+    assert all(text.endswith("litres per metre and day") for text in shown.values())
+    assert discharge.in_words({"crest": 0.0}, discharge.RING) == {"crest": "0 m3/day all around the axis"}
 
 
 @pytest.mark.parametrize("number, shown", [(1, [0]), (3, [0, 1, 2]), (7, [0, 2, 4, 6])])
