@@ -5,12 +5,14 @@ with the test's name in the list, and ends, upon which mpirun ends the others.
 """
 
 import faulthandler
+import gc
 import os
 import sys
 from pathlib import Path
 
 import pytest
 from mpi4py import MPI
+from petsc4py import PETSc
 
 PYTHON_TESTS = Path(__file__).parents[1] / "python"
 sys.path[:0] = [str(PYTHON_TESTS / folder) for folder in (".", "laws", "io")]  # what tests on one rank use too
@@ -38,6 +40,19 @@ def pytest_runtest_makereport(item, call):
     if failed:
         report.outcome = "failed"
         report.longrepr = "\n\n".join(failed)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def garbage():
+    """Let all ranks drop objects in cycles at the same places.
+
+    PETSc frees a communicator with the last object on it. Where ranks collect garbage at times of their own, the next object is made on
+    a new communicator on some of them only, which wait for the others for ever, at the end of the program at the latest.
+    """
+    gc.disable()
+    yield
+    gc.collect()
+    PETSc.garbage_cleanup()
 
 
 @pytest.fixture(scope="session")
