@@ -11,12 +11,9 @@ from numpy.typing import NDArray
 from fenics_bridge import compat
 from fenics_bridge.errors import agree, require_mesh
 from fenics_bridge.mesh.names import name_tags, names_of
-from fenics_bridge.mesh.tagged import require_tags_of, tag_values
-from fenics_bridge.mesh.walls import distance_from, lines_of, require_along
+from fenics_bridge.mesh.tagged import require_tags_of, retagged, tag_values
+from fenics_bridge.mesh.walls import ON_LINE, distance_from, lines_of, require_along
 from fenics_bridge.types import MeshTags
-
-TOUCHING = 0.02
-"""Distance from a line up to which a corner of a cell is on it, over the size of the cell"""
 
 
 def tags_beside(domain: mesh.Mesh, cell_tags: MeshTags, wall: Any) -> tuple[MeshTags, dict[int, int]]:
@@ -55,9 +52,6 @@ def tags_beside(domain: mesh.Mesh, cell_tags: MeshTags, wall: Any) -> tuple[Mesh
     old = sorted(set().union(*comm.allgather(set(tags[rows].tolist()))))
     first = 1 + max(comm.allgather(int(cell_tags.values.max(initial=0))))
     tags[rows] = first + np.searchsorted(old, tags[rows])
-    tagged = np.flatnonzero(tags).astype(np.int32)
-    result = mesh.meshtags(domain, dim, tagged, tags[tagged])
-    result.name = cell_tags.name
     before = dict(zip(range(first, first + len(old)), old))
     there = set().union(*comm.allgather(set(tags.tolist())))
     names = {  # without tags of which all cells are beside the line
@@ -66,7 +60,7 @@ def tags_beside(domain: mesh.Mesh, cell_tags: MeshTags, wall: Any) -> tuple[Mesh
         )
         for name, numbers in names_of(cell_tags).items()
     }
-    return name_tags(result, names), before
+    return name_tags(retagged(domain, cell_tags, tags), names), before
 
 
 def _beside(corners: NDArray[np.float64], line: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -80,5 +74,5 @@ def _beside(corners: NDArray[np.float64], line: NDArray[np.float64]) -> NDArray[
         part = (centre - start) @ along / (along @ along)
         # Around a corner of the line there are cells that lie beyond the ends of both of its sides, and touch the line all the same.
         inside = ((part >= 0) | ring | (k > 0)) & ((part <= 1) | ring | (k < last))
-        beside |= (apart <= TOUCHING * size) & inside
+        beside |= (apart <= ON_LINE * size) & inside
     return beside

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from fenics_bridge import compat
 from fenics_bridge.errors import agree, real_numbers, require_mesh
 from fenics_bridge.mesh.names import label, name_tags, names_of, tag_numbers
-from fenics_bridge.mesh.tagged import tag_values
+from fenics_bridge.mesh.tagged import retagged, tag_values
 from fenics_bridge.types import MeshTags, OfPosition
 
 
@@ -63,13 +63,12 @@ def graded_tags(
     present = sorted(set().union(*comm.allgather(set(np.unique(number).tolist()))))
     first = 1 + comm.allreduce(int(cell_tags.values.max(initial=0)), MPI.MAX)
     tags[rows] = first + np.searchsorted(present, number)
-    tagged = np.flatnonzero(tags).astype(np.int32)
-    graded = mesh.meshtags(domain, dim, tagged, tags[tagged])
-    graded.name = cell_tags.name
     new = tuple(range(first, first + len(present)))
     name = soil if isinstance(soil, str) else label(cell_tags, soil).strip("'")
     kept = {other: _without(numbers, old, new) for other, numbers in names_of(cell_tags).items()}
-    return name_tags(graded, {**kept, name: new}), dict(zip(new, low + width * (np.array(present) + 0.5)))
+    return name_tags(retagged(domain, cell_tags, tags), {**kept, name: new}), dict(
+        zip(new, low + width * (np.array(present) + 0.5))
+    )
 
 
 def _without(numbers: Any, old: Any, new: Any) -> Any:

@@ -110,6 +110,14 @@ def tag_values(domain: Mesh, tags: MeshTags | None, dim: int) -> NDArray[np.int3
     return values
 
 
+def retagged(domain: Mesh, cell_tags: MeshTags, values: NDArray[np.int32]) -> MeshTags:
+    """Tags with other values, one for every cell on this rank, ghosts too, and 0 where untagged; without names of the values."""
+    tagged = np.flatnonzero(values).astype(np.int32)
+    result = meshtags(domain, cell_tags.dim, tagged, values[tagged])
+    result.name = cell_tags.name
+    return result
+
+
 def numbered_anew(domain: Mesh, tags: MeshTags, groups: Sequence[Sequence[int]]) -> MeshTags:
     """Tags by which a form reads the same, and is compiled once, whatever the numbers of the tags that it is made for.
 
