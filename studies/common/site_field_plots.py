@@ -24,21 +24,16 @@ LABELS = {"cohesion": ("Cohesion [kPa]", 1e-3), "friction_angle": ("Friction ang
 def random_pictures(site: Site, fem: bridge.QuasiStatic, folder: Path) -> Pictures:
     """Pictures of the random fields of a site on a mesh, one for each parameter; none without any. Collective."""
     comm, nodes = fem.domain.comm, compat.cell_nodes(fem.domain)[fem.points.cells]
-    tags, corners = (
-        np.array([*fem.soils, 0])[fem.points.material],
-        fem.domain.geometry.x[nodes, :2],
-    )  # the last one: not there
-    pictures: Pictures = {}
+    corners, pictures = fem.domain.geometry.x[nodes, :2], {}
+    tags = np.array([*fem.soils, 0])[fem.points.material]  # 0, the last one, where no soil is
     for name in dict.fromkeys(field.parameter for field in site.random):
         soils = [field.soil for field in site.random if field.parameter == name]
         values = fem.points.parameters[name].reshape(len(corners), -1).mean(axis=1)
         found = comm.gather((corners, np.where(np.isin(tags, site.tags_of(soils)), values, np.nan)))
         if found is not None:
             cells, shown = (np.concatenate(parts) for parts in zip(*found))
-            pictures = {
-                **pictures,
-                f"random_{name}": partial(_save, folder / f"random_{name}.png", cells, shown, name, site.axisymmetric),
-            }
+            path = folder / f"random_{name}.png"
+            pictures[path.stem] = partial(_save, path, cells, shown, name, site.axisymmetric)
     return pictures
 
 

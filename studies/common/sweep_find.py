@@ -10,6 +10,8 @@ from scipy import optimize
 
 from mpm_core import InputError
 
+from .sweep_plan import number_of
+
 MOST_RUNS = 20
 """Runs after which the search ends"""
 NEAR = 1e-3
@@ -50,21 +52,14 @@ def wanted_of(parameter: str, target: str) -> Wanted:
     """
     name, _, interval = parameter.partition("=")
     result, _, text = target.partition("=")
-    try:
-        low, high = map(float, interval.split(":"))
-    except ValueError:
-        low = high = math.nan
-    if not name or not -math.inf < low < high < math.inf:
+    ends, value = [number_of(end) for end in interval.split(":")], number_of(text)
+    if not name or len(ends) != 2 or ends[0] is None or ends[1] is None or ends[0] >= ends[1]:
         raise InputError(
             f"--find is {parameter!r}, expected NAME=LOW:HIGH with rising numbers, such as friction-angle=15:35"
         )
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not result or not math.isfinite(value):
+    if not result or value is None:
         raise InputError(f"--target is {target!r}, expected RESULT=VALUE, such as factor_of_safety=1")
-    return Wanted(name.removeprefix("--"), low, high, result, value)
+    return Wanted(name.removeprefix("--"), ends[0], ends[1], result, value)
 
 
 def find(wanted: Wanted, results_at: Callable[[list[float]], list[float]]) -> Found:

@@ -34,10 +34,9 @@ def hazard_maps(runs: Sequence[Run], folder: Path) -> Pictures:
         The pictures of the maps, to be drawn.
     """
     there = [run.folder for run in runs if run.results]
-    files = [path for end in (".asc", ".tif") for path in ((there or [folder])[0] / f"reached{end}",) if path.is_file()]
-    if len(there) < 2 or not files:
+    ending = next((end for end in (".asc", ".tif") if there and (there[0] / f"reached{end}").is_file()), None)
+    if len(there) < 2 or ending is None:
         return {}
-    ending = files[0].suffix
     maps = {name: [_read(one / f"{name}{ending}") for one in there] for name in ("reached", "most", "speed")}
     first = maps["reached"][0]
     if any(not _same_grid(first, other) for several in maps.values() for other in several):
@@ -49,14 +48,12 @@ def hazard_maps(runs: Sequence[Run], folder: Path) -> Pictures:
         )
         values[f"{name}_95_percent"] = np.where(highest > 0, highest, np.nan)
     ground = _read(there[0] / f"ground{ending}")
-    pictures: Pictures = {}
+    pictures = {}
     for name, value in values.items():
         write_raster(folder / f"{name}{ending}", Raster(first.x, first.y, value, first.crs))
         shown = Raster(first.x, first.y, np.where(value > 0, value, np.nan), first.crs)
-        pictures = {
-            **pictures,
-            name: partial(save_map, folder / f"{name}.png", ground, shown, LABELS[name], limits=LIMITS.get(name)),
-        }
+        path, limits = folder / f"{name}.png", LIMITS.get(name)
+        pictures[name] = partial(save_map, path, ground, shown, LABELS[name], limits=limits)
     return pictures
 
 

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from .figures import curve_figure
+from .plots import CURVES
 from .sweep_plan import Variable, column
 from .sweep_results import changes_alone, label, rank_correlations, values_of
 from .sweep_runs import Run
 
-BLUE, RED, GREY = "#1f4e79", "#b03a2e", "#808080"
-COLOURS = (BLUE, RED, "#2e7d32", "#8e5ea2", "#d08c1d", "#17877d", "#5d4037", "#6b6b6b")
+BLUE, RED = CURVES[:2]
 MOST_PANELS = 4
 """Parameters over which samples are drawn, those with the largest correlation"""
 MOST_BINS = 25
@@ -58,7 +58,7 @@ def _curves(
             mine = in_order(mine, along.name)
             x, y = column([run.values[along.name] for run in mine]), values_of(mine, result)
             text = f"{names[other[0].name]}: {_shown(group)}" if other else None
-            axes.plot(x, y, "o-", color=COLOURS[k % len(COLOURS)], markersize=3, linewidth=1.1, label=text)
+            axes.plot(x, y, "o-", color=CURVES[k % len(CURVES)], markersize=3, linewidth=1.1, label=text)
         axes.set(xlabel=names[along.name], ylabel=label(result))
         _draw_mark(axes.axhline, mark)
         if other or mark is not None:
