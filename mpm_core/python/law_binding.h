@@ -201,7 +201,8 @@ py::class_<L> bind_law(py::module_& m, const std::string& name, const std::strin
           "Shear modulus G [Pa]; an estimate of its size where it changes or is not known")
       .def("wave_moduli", &wave_moduli<L>, py::arg("stress"), py::arg("state"),
            "Moduli of compression and shear waves of points as they are now (n, 2) [Pa]; they differ from those of the "
-           "law's numbers in `CamClay` and `NorSand`, by the pressure, and in `Heterogeneous`. Stress (n, S) [Pa], "
+           "law's numbers in `CamClay`, `NorSand`, `Sanisand` and `HardeningSoil`, by the pressure, and in "
+           "`Heterogeneous`. Stress (n, S) [Pa], "
            "state (n, n_state).")
       .def_property_readonly(
           "needs_cell_size", [](const L& law) { return needs(law).cell_size; },

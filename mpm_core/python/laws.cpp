@@ -80,6 +80,61 @@ Source: Dafalias, Manzari (2004), J. Eng. Mech. 130, 622-634.)")
       .attr("atmospheric_pressure") = Sanisand::atmospheric_pressure;
 }
 
+/// Rows of shear_hardening and log_preconsolidation
+template <int D>
+py::array_t<double> hardened_rows(const HardeningSoil& law, std::span<const double> stress, py::ssize_t n,
+                                  double overconsolidation)
+{
+  py::array_t<double> states({n, py::ssize_t{2}});
+  for (py::ssize_t row = 0; row < n; ++row)
+  {
+    SymTensor<D> of_point;
+    std::copy_n(stress.begin() + row * n_stress<D>, n_stress<D>, of_point.begin());
+    const auto [shear, cap] = hardened_to<D>(law, of_point, overconsolidation);
+    states.mutable_at(row, 0) = shear;
+    states.mutable_at(row, 1) = cap;
+  }
+  return states;
+}
+
+void bind_hardening_soil(py::module_& m)
+{
+  bind_law<HardeningSoil>(
+      m, "HardeningSoil",
+      "Hardening Soil: stiffness by stress, in first loading, unloading and compression, for sand, gravel and clay.",
+      R"(With the principal stresses s1 >= s2 >= s3 (positive in compression here), a = c cot(phi) and
+t = (s3 + a) / (reference_pressure + a):
+
+- elasticity of unloading and reloading: E_ur = unloading_modulus t^exponent, and a constant Poisson's ratio;
+- strength: that of Mohr and Coulomb;
+- first loading in shear: in a drained triaxial test the axial strain is a hyperbola of s1 - s3, with the secant modulus
+  secant_modulus t^exponent at half of the strength and its asymptote at the strength over failure_ratio;
+- dilatancy: by Rowe (1962) with dilation_angle at failure; soil does not contract by shear alone;
+- compression: an elliptic cap around the pressures that the soil has carried, with associated flow, which gives the
+  oedometer_modulus and normal_k0 in the oedometer at the reference pressure.
+
+The state variables are shear_hardening, the hardening shear strain less that of the start, and log_preconsolidation, the
+logarithm of the size of the cap over that of the start. Ground that is loaded from zero stress by its weight is
+normally consolidated, or less where vertical_preconsolidation is given, and so are points that begin with stresses;
+hardening_soil_state gives the states of overconsolidated ones. Increments are implicit, with elastic moduli that are secants between the stresses of start and end. The
+direction of plastic strains is that of the deviator of the stress. Small-strain stiffness is not part of the law.
+
+Source: Schanz, Vermeer, Bonnier (1999), Beyond 2000 in Computational Geotechnics, 281-296; Benz (2007), Small-strain
+stiffness of soils and its numerical consequences, University of Stuttgart, chapter 6.)")
+      .def_readonly("strength_factor", &HardeningSoil::strength_factor, "What the strength is divided by");
+  m.def(
+      "hardened_to",
+      [](const HardeningSoil& law, const py::array& stress, double overconsolidation)
+      {
+        const py::ssize_t n = stress.shape(0), width = stress.shape(1);
+        check_array<double>("stress", stress, {n, width});
+        const auto values_of = values<double>(stress);
+        return width == 4 ? hardened_rows<2>(law, values_of, n, overconsolidation)
+                          : hardened_rows<3>(law, values_of, n, overconsolidation);
+      },
+      py::arg("law"), py::arg("stress"), py::arg("overconsolidation"));
+}
+
 void bind_softening(py::module_& m)
 {
   py::enum_<Softening>(m, "Softening").value("LINEAR", Softening::linear).value("EXPONENTIAL", Softening::exponential);
@@ -284,6 +339,7 @@ void bind_laws(py::module_& m)
   bind_declaration(m);
   m.attr("law_types") = py::list();
   bind_soils(m);
+  bind_hardening_soil(m);
   bind_softening(m);
   bind_drucker_prager(m);
   bind_python_law(m);

@@ -42,6 +42,13 @@ def column_settlement(height=1.0, young=YOUNG, poisson=POISSON, unit_weight=UNIT
     return -unit_weight * height**2 / (2 * oedometer)
 
 
+def top_of_column(model):
+    """Vertical displacement of the top of the column [m]."""
+    top = np.full((1, model.domain.geometry.dim), 0.2)
+    top[0, -1] = 1.0
+    return model.evaluate_at(top)["displacement"][0, -1]
+
+
 def interior_points(n, dim, seed=0):
     """Random points inside the column of unit height and half that width."""
     width = [0.5] * (dim - 1)

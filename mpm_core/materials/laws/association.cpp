@@ -19,7 +19,10 @@ double fraction(const Umat& law)
   return associated_fraction(kinds, values);
 }
 
-double fraction(const MohrCoulomb& law)
+/// Of laws with both angles
+template <class L>
+requires requires(L law) { law.friction_angle + law.dilation_angle; }
+double fraction(const L& law)
 {
   constexpr double degree = std::numbers::pi / 180;
   const bool less = law.dilation_angle < law.friction_angle;

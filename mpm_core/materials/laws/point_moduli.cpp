@@ -24,6 +24,13 @@ WaveModuli moduli_of_sand(const Sanisand& law, double pressure, double log_volum
   return {(bulk_per_shear(law) + 4.0 / 3) * shear, shear};
 }
 
+/// At a smallest principal stress, positive in compression
+WaveModuli moduli_of_hardening_soil(const HardeningSoil& law, double stress)
+{
+  const double growth = unloading_modulus(law, stress) / law.unloading_modulus;
+  return {growth * p_wave_modulus(law), growth * shear_modulus(law)};
+}
+
 LawList<> own_law(const Heterogeneous& law, std::span<const double> state)
 {
   const auto first = state.begin() + n_state(law.law);
@@ -40,6 +47,7 @@ struct DiffersByPoint
   bool operator()(const CamClay&) const { return true; }
   bool operator()(const NorSand&) const { return true; }
   bool operator()(const Sanisand&) const { return true; }
+  bool operator()(const HardeningSoil&) const { return true; }
   bool operator()(const Heterogeneous& law) const
   {
     const auto is_elastic = [](const std::string& name)
@@ -75,6 +83,7 @@ struct ModuliOfPoint
   {
     return moduli_of_sand(law, law.attraction - mean_stress, state[1]);
   }
+  WaveModuli operator()(const HardeningSoil& law) const { return moduli_of_hardening_soil(law, -mean_stress); }
   WaveModuli operator()(const Heterogeneous& law) const { return std::visit(*this, own_law(law, state)); }
   WaveModuli operator()(const Hencky& law) const
   {
@@ -116,6 +125,11 @@ struct LimitingModulus
   {
     const double pressure = std::max(2 * (law.attraction - mean_stress), law.largest_pressure + law.attraction);
     return moduli_of_sand(law, pressure, state[1]).p_wave;
+  }
+  double operator()(const HardeningSoil& law) const
+  {
+    const double apex = attraction(law);
+    return moduli_of_hardening_soil(law, 2 * (apex - mean_stress) - apex).p_wave;
   }
   double operator()(const Heterogeneous& law) const { return std::visit(*this, law.law); }
   double operator()(const Hencky& law) const { return std::visit(*this, law.law); }

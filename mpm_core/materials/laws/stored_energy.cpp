@@ -87,6 +87,26 @@ double energy(const Sanisand& law, const SymTensor<D>& stress, const double* sta
   return volumetric / bulk_per_root + squared / (4 * shear);
 }
 
+/// (x^k - y^k) / k, for k = 0 as well
+double power_difference(double x, double y, double k)
+{
+  return std::abs(k) < 1e-9 ? std::log(x / y) : (std::pow(x, k) - std::pow(y, k)) / k;
+}
+
+/// With moduli in proportion to a power of the pressure, of which the present ones are known, along the path of
+/// constant ratios of stress to the apex, then at constant pressure
+template <int D>
+double energy(const HardeningSoil& law, const SymTensor<D>& stress, const double*)
+{
+  const auto [mean, squared] = invariants<D>(stress);
+  const double apex = attraction(law), least = 1e-4 * (law.reference_pressure + apex), m = law.exponent;
+  const double pressure = std::max(apex - mean, least), start = std::max(apex, least);
+  const double young = unloading_modulus(law, smallest_stress<D>(law, stress));
+  const double bulk = young / (3 * (1 - 2 * law.poisson)), shear = young / (2 * (1 + law.poisson));
+  const double volumetric = power_difference(pressure, start, 2 - m) - start * power_difference(pressure, start, 1 - m);
+  return std::pow(pressure, m) / bulk * volumetric + squared / (4 * shear);
+}
+
 template <int D>
 double energy(const ExternalLaw&, const SymTensor<D>&, const double*)
 {

@@ -163,6 +163,13 @@ NorSand reduced_strength(const NorSand& law, double factor)
   return reduced;
 }
 
+HardeningSoil reduced_strength(const HardeningSoil& law, double factor)
+{
+  HardeningSoil reduced = law;
+  reduced.strength_factor *= factor;
+  return reduced;
+}
+
 Sanisand reduced_strength(const Sanisand& law, double factor)
 {
   Sanisand reduced = law;

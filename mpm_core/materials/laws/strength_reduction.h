@@ -19,6 +19,8 @@ DruckerPrager reduced_strength(const DruckerPrager& law, double factor);
 CamClay reduced_strength(const CamClay& law, double factor);
 NorSand reduced_strength(const NorSand& law, double factor);
 Sanisand reduced_strength(const Sanisand& law, double factor);
+/// As `MohrCoulomb`; stiffness and cap stay.
+HardeningSoil reduced_strength(const HardeningSoil& law, double factor);
 
 /// Reduces the parameters that the law names.
 /// @throws InputError it names none

@@ -16,6 +16,7 @@ from ._core import (
     LawParameter,
     LinearElastic,
     MohrCoulomb,
+    HardeningSoil,
     NorSand,
     PythonLaw,
     RelaxationKind,
@@ -40,7 +41,15 @@ from .field_contact import FieldContact
 from .ghost import GhostPenalty
 from .integration import default_integration
 from .law_parameters import signature_of
-from .laws import log_preconsolidation, matched_drucker_prager, nor_sand_state, sanisand_state, tresca, von_mises
+from .laws import (
+    hardening_soil_state,
+    log_preconsolidation,
+    matched_drucker_prager,
+    nor_sand_state,
+    sanisand_state,
+    tresca,
+    von_mises,
+)
 from .members import Member, MemberForces, bar, beam, strut
 from .mesh import Mesh
 from .model import Model
@@ -92,6 +101,7 @@ __all__ = [
     "MohrCoulomb",
     "Motion",
     "Newton",
+    "HardeningSoil",
     "NorSand",
     "Particles",
     "Plane",
@@ -128,6 +138,7 @@ __all__ = [
     "log_preconsolidation",
     "matched_drucker_prager",
     "motion_of_acceleration",
+    "hardening_soil_state",
     "nor_sand_state",
     "parts",
     "read_acceleration",

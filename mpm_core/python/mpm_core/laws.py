@@ -7,12 +7,14 @@ from ._core import (
     CamClay,
     ConeMatch,
     DruckerPrager,
+    HardeningSoil,
     InputError,
     MohrCoulomb,
     NorSand,
     Sanisand,
     cone_slope,
     cone_strength,
+    hardened_to,
 )
 from .checks import member, positive, real_numbers
 from .mesh import floats
@@ -158,6 +160,33 @@ def sanisand_state(law: Sanisand, stress: ArrayLike, state_parameter: ArrayLike)
     relative = pressure / Sanisand.atmospheric_pressure
     critical = law.critical_void_ratio - law.critical_compression * relative**law.critical_exponent
     return {"log_specific_volume": _volume_beside(law, critical, state_parameter, pressure)[1]}
+
+
+def hardening_soil_state(
+    law: HardeningSoil, stress: ArrayLike, overconsolidation: float = 1.0
+) -> dict[str, NDArray[np.float64]]:
+    """The states of points of Hardening Soil that begin with a stress and an overconsolidation ratio.
+
+    Their hardening is what the stress itself and `vertical_preconsolidation` of the law need, and for a ratio above 1 at least that
+    of level ground which has been normally consolidated to the largest principal stress times the ratio.
+
+    Args:
+        law: the soil.
+        stress: effective stress [Pa], tension positive, shape (n, 4) or (n, 6).
+        overconsolidation: largest vertical stress before over that of the start, OCR [-], at least 1.
+
+    Returns:
+        `shear_hardening` and `log_preconsolidation`, shape (n,) each, for ``Model.set_state(name, values)``.
+
+    Raises:
+        InputError: overconsolidation below 1, or stress of another shape.
+    """
+    _check_overconsolidation(overconsolidation)
+    rows = floats("stress", stress, (None, None))
+    if rows.shape[1] not in (4, 6):
+        raise InputError(f"stress has shape {rows.shape}, expected (n, 4) or (n, 6)")
+    shear, cap = hardened_to(law, rows, overconsolidation).T
+    return {"shear_hardening": shear.copy(), "log_preconsolidation": cap.copy()}
 
 
 def _volume_beside(

@@ -14,6 +14,7 @@ from bridge_cases import (
     excess_of_strength,
     interior_points,
     slope_model,
+    top_of_column,
 )
 from dolfinx import mesh
 from mpi4py import MPI
@@ -28,12 +29,6 @@ def elastic_column(dim, degree=2):
     domain, facet_tags, supports, _ = column(dim)
     law = mpm.LinearElastic(young=YOUNG, poisson=POISSON)
     return bridge.QuasiStatic(domain, law, facet_tags, supports, degree)
-
-
-def top_of_column(model):
-    top = np.full((1, model.domain.geometry.dim), 0.2)
-    top[0, -1] = 1.0
-    return model.evaluate_at(top)["displacement"][0, -1]
 
 
 @pytest.mark.parametrize(("dim", "degree"), [(2, 2), (3, 2), (2, 4)])

@@ -21,6 +21,10 @@ SAND = mpm.NorSand(
     critical_void_ratio=0.9, critical_compression=0.03, critical_slope=1.25, dilatancy=4.0, hardening=100.0, rigidity=200.0,
     poisson=0.2, void_ratio=0.84, image_pressure=25e3,
 )  # fmt: skip
+HARDENING = mpm.HardeningSoil(
+    secant_modulus=20e6, oedometer_modulus=20e6, unloading_modulus=60e6, cohesion=1e3, friction_angle=33.0, dilation_angle=3.0,
+    vertical_preconsolidation=60e3,
+)  # fmt: skip
 LAWS = {
     "elastic": mpm.LinearElastic(**ELASTIC),
     "Mohr-Coulomb": SOIL,
@@ -36,6 +40,9 @@ LAWS = {
     "SANISAND": sand(),
     "undrained SANISAND": mpm.Undrained(sand(), water_modulus=2e8, porosity=0.45),
     "Hencky SANISAND": mpm.Hencky(sand()),
+    "Hardening Soil": HARDENING,
+    "undrained Hardening Soil": mpm.Undrained(HARDENING, water_modulus=2e8, porosity=0.45),
+    "Hencky Hardening Soil": mpm.Hencky(HARDENING),
     "Hencky": mpm.Hencky(SOIL),
     "viscoplastic": mpm.ViscoplasticMohrCoulomb(
         **ELASTIC, cohesion=10e3, friction_angle=25.0, dilation_angle=5.0, viscosity=1e-6

@@ -17,6 +17,8 @@ PARTS = {
     "Hencky": {"law": SOIL},
     "Undrained": {"skeleton": SOIL},
 }
+RELATED = {"HardeningSoil": {"oedometer_modulus": 0.5}}
+"""Values that others of the same law bound"""
 CODE = {"PythonLaw", "Umat"}
 """Laws that call code of the user; what they need is tested with them."""
 LAWS = [law for law in _core.law_types if law.__name__ not in CODE]
@@ -37,7 +39,7 @@ def allowed(law):
             values[p.name] = 0.5 * (low + high)
         else:
             values[p.name] = 1.0 if low == 0 else 2.0 if low is None else low + 1.0
-    return values
+    return values | RELATED.get(law.__name__, {})
 
 
 def outside(p):

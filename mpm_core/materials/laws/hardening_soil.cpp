@@ -1,0 +1,298 @@
+#include "materials/laws/hardening_soil.h"
+
+#include "materials/laws/hardening_soil_return.h"
+#include "materials/tools/require.h"
+#include "materials/tools/side_by_side.h"
+
+namespace mpm::materials
+{
+namespace hardening_soil
+{
+namespace
+{
+constexpr double degree = std::numbers::pi / 180;
+constexpr double most_stress = 1e15; ///< [Pa], of values that can be worked with
+
+/// Stress and strain of first loading in the oedometer at the reference pressure, by the vertical stress
+struct Oedometer
+{
+  double mobilised;              ///< (s1 - s3) / q_f
+  double volumetric, deviatoric; ///< strains per Pa without those of the cap
+  double pressure, q, cap;       ///< p + a, q and their slopes
+  double pressure_slope, q_slope;
+};
+
+double normal_k0(const HardeningSoil& law)
+{
+  return law.normal_k0 > 0 ? law.normal_k0 : 1 - std::sin(law.friction_angle * degree);
+}
+
+/// Without the cap, whose constants follow from it
+Oedometer oedometer_of(const HardeningSoil& law, const Soil& soil)
+{
+  const double k0 = normal_k0(law), least = law.reference_pressure * k0 + soil.attraction;
+  const Dual<1> vertical = variable<1>(law.reference_pressure, 0), smallest = k0 * vertical + soil.attraction;
+  const Dual<1> q = vertical - k0 * vertical, mobilised = q / (soil.slope * smallest);
+  const double young = soil.unloading * std::pow(least / soil.reference, soil.exponent);
+  const double sheared = std::max(shear_of(soil, smallest, mobilised).slopes[0], 0.0);
+  const double dilation = dilatancy(soil, mobilised.value), pressure_slope = (1 + 2 * k0) / 3;
+  const double elastic = pressure_slope / (soil.bulk_per_young() * young);
+  return {mobilised.value,
+          elastic - dilation * sheared,
+          q.slopes[0] / (3 * soil.shear_per_young() * young) + 0.5 * (1 - dilation / 3) * sheared,
+          pressure_slope * law.reference_pressure + soil.attraction,
+          q.value,
+          0,
+          pressure_slope,
+          q.slopes[0]};
+}
+
+/// Sets the constants of the cap, so that first loading in the oedometer has its modulus and its K0.
+void set_cap(Soil& soil, const HardeningSoil& law, const Oedometer& test)
+{
+  const double volumetric = 1 / law.oedometer_modulus - test.volumetric;
+  const double deviatoric = 2.0 / 3 / law.oedometer_modulus - test.deviatoric;
+  const double w = direction_of(soil, 1.0).cap, p = test.pressure, q = test.q;
+  soil.cap_slope = std::sqrt(deviatoric / volumetric * p / q) / w;
+  const double cap = cap_through(soil, p, q, w), slope = soil.cap_slope * w;
+  const double cap_change = (slope * slope * q * test.q_slope + p * test.pressure_slope) / cap;
+  soil.cap_modulus = cap_change / volumetric * std::pow(cap / soil.reference, -soil.exponent);
+}
+
+/// Sets gamma and p_p of ground that has carried a vertical stress.
+void set_start(Soil& soil, const HardeningSoil& law, double vertical)
+{
+  const double k0 = normal_k0(law), stress = std::max(k0 * vertical + soil.attraction, least_stress * soil.reference);
+  const double q = (1 - k0) * vertical, pressure = std::max((1 + 2 * k0) / 3 * vertical + soil.attraction, stress);
+  soil.shear = std::max(shear_of(soil, stress, std::min(q / (soil.slope * stress), 1.0)), 0.0);
+  soil.cap = cap_through(soil, pressure, q, direction_of(soil, 1.0).cap);
+}
+
+/// The soil with its full strength, without cap
+Soil uncapped(const HardeningSoil& law)
+{
+  const double sine = std::sin(law.friction_angle * degree), dilation = std::sin(law.dilation_angle * degree);
+  const double apex = law.cohesion / std::tan(law.friction_angle * degree);
+  const double reference = law.reference_pressure + apex;
+  return {apex,
+          reference,
+          2 * sine / (1 - sine),
+          (sine - dilation) / (1 - sine * dilation),
+          law.secant_modulus,
+          law.unloading_modulus,
+          law.exponent,
+          law.failure_ratio,
+          law.poisson,
+          (3 + sine) / (3 - sine),
+          0,
+          1,
+          std::max(apex - law.tension_cutoff, least_stress * reference),
+          0,
+          0};
+}
+
+/// The strength divided by a factor: c / F and tan(phi) / F. The apex c cot(phi) stays.
+void reduce(Soil& soil, const HardeningSoil& law)
+{
+  const double angle = std::atan(std::tan(law.friction_angle * degree) / law.strength_factor);
+  const double sine = std::sin(angle), dilation = std::sin(std::min(law.dilation_angle * degree, angle));
+  soil.slope = 2 * sine / (1 - sine);
+  soil.critical_sine = (sine - dilation) / (1 - sine * dilation);
+}
+} // namespace
+
+Soil soil_of(const HardeningSoil& law)
+{
+  Soil soil = uncapped(law);
+  set_cap(soil, law, oedometer_of(law, soil));
+  set_start(soil, law, law.vertical_preconsolidation);
+  if (law.strength_factor != 1)
+    reduce(soil, law);
+  return soil;
+}
+
+/// A deviator's q and the direction of it
+template <int D>
+std::pair<double, Direction<double>> shape_of(const Soil& soil, const SymTensor<D>& deviator)
+{
+  const auto square = square_along<D>(deviator, {});
+  const double q = std::sqrt(square[0]);
+  return {q, direction_of(soil, lode_cosine(-13.5 * determinant<D>(deviator), q))};
+}
+
+template <int D>
+struct Tensors
+{
+  SymTensor<D> stress, strain; ///< deviators, tension positive
+};
+
+/// gamma and p_p of a point before the increment. Soil that has never been loaded begins with those of its stress,
+/// where they are more than those of the law.
+/// @param pressure, stress  p + a and s3 + a
+template <int D>
+std::pair<double, double> hardening_of(const Soil& soil, const PointBatch<D>& points, Index i, double pressure,
+                                       double stress, double q, const Direction<double>& direction)
+{
+  const double plastic = points.state[0][i], shear = points.state[1][i], growth = points.state[2][i];
+  if (plastic != 0 || shear != 0 || growth != 0)
+    return {soil.shear + shear, soil.cap * std::exp(growth)};
+  const double mobilised = std::min(direction.difference * q / (soil.slope * stress), 1.0);
+  return {std::max(soil.shear, shear_of(soil, stress, mobilised)),
+          std::max(soil.cap, cap_through(soil, pressure, q, direction.cap))};
+}
+
+template <int D>
+Start start_of(const Soil& soil, const PointBatch<D>& points, Index i, Tensors<D>& tensors)
+{
+  const auto [stress, strain] = tensors_of<D>(points, i);
+  tensors = {deviator<D>(stress), deviator<D>(strain)};
+  const auto [q, direction] = shape_of<D>(soil, tensors.stress);
+  const double pressure = soil.attraction - mean<D>(stress);
+  const double smallest = std::max(pressure - direction.smallest * q, soil.least);
+  const auto [shear, cap] = hardening_of<D>(soil, points, i, pressure, smallest, q, direction);
+  return {pressure,
+          smallest,
+          shear,
+          cap,
+          -3 * mean<D>(strain),
+          square_along<D>(tensors.stress, tensors.strain),
+          cube_along<D>(tensors.stress, tensors.strain)};
+}
+
+bool is_sound(const Start& start)
+{
+  return std::abs(start.pressure) + start.stress + start.cap < most_stress && std::isfinite(start.shear) &&
+         std::abs(start.volumetric) + std::abs(start.square[1]) + start.square[2] < most_stress;
+}
+
+template <int D>
+void write_tangent(const Soil& soil, const Start& start, const Solution& solution, const Tensors<D>& tensors,
+                   double* tangent)
+{
+  using T = Dual<5>;
+  const auto& [log_stress, mobilised] = solution.at;
+  const End<T> end = end_of<T>(soil, start, {variable<5>(log_stress, 0), variable<5>(mobilised, 1)},
+                               {variable<5>(0, 2), variable<5>(0, 3), variable<5>(0, 4)});
+  const auto& volume = end.volumetric.slopes;
+  const auto& shape = end.deviatoric.slopes;
+  const double determinant = volume[0] * shape[1] - volume[1] * shape[0];
+  // Derivative of a number of the end by one of the changes, with the unknowns as the equations have them
+  const auto total = [&](const T& number, std::size_t by)
+  {
+    const double by_stress = solution.is_loose ? 0 : (volume[1] * shape[by] - shape[1] * volume[by]) / determinant;
+    const double by_mobilised = -(shape[by] + shape[0] * by_stress) / shape[1];
+    return number.slopes[by] + number.slopes[0] * by_stress + number.slopes[1] * by_mobilised;
+  };
+  const double trial_q = end.trial_q.value;
+  const T ratio = trial_q > 0 ? end.q / end.trial_q : T{1.0};
+  const auto slopes = [&](std::size_t by) {
+    return SecantSlopes{total(end.pressure, by), total(end.shear_modulus, by), total(ratio, by)};
+  };
+  const SecantTrial<D> trial = secant_trial<D>(end.shear_modulus.value, tensors.stress, tensors.strain);
+  write_secant_tangent<D>(trial, tensors.strain, ratio.value, slopes(2), slopes(3), tangent);
+  const double cosine = lode_cosine(polynomial<double>(start.cube, 2 * trial.shear), trial.q);
+  add_secant_tangent<D>(trial, tensors.strain, ratio.value, slopes(4),
+                        lode_cosine_slope<D>(trial.deviator, trial.q, cosine), tangent);
+}
+
+template <int D>
+Outcome update_point(const Soil& soil, const PointBatch<D>& points, Index i, double* tangent)
+{
+  Tensors<D> tensors;
+  const Start start = start_of<D>(soil, points, i, tensors);
+  const std::optional<Solution> solution = is_sound(start) ? solution_of(soil, start) : std::nullopt;
+  if (!solution)
+    return Outcome::failed;
+  const End<double> end = end_of<double>(soil, start, solution->at);
+  if (!(end.pressure + end.trial_q < most_stress))
+    return Outcome::failed;
+  const double ratio = end.trial_q > 0 ? end.q / end.trial_q : 0;
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+    points.stress[k][i] = ratio * (tensors.stress[k] + 2 * end.shear_modulus * tensors.strain[k]) +
+                          (k < 3 ? soil.attraction - end.pressure : 0.0);
+  points.state[0][i] += end.plastic;
+  points.state[1][i] = start.shear + end.shear - soil.shear;
+  points.state[2][i] = std::log(start.cap / soil.cap) + end.cap_growth;
+  if (tangent)
+    write_tangent<D>(soil, start, *solution, tensors, tangent);
+  return end.plastic > 0 || end.cap_growth > 0 || solution->is_loose ? Outcome::plastic : Outcome::elastic;
+}
+} // namespace hardening_soil
+
+void check(const HardeningSoil& law)
+{
+  using namespace hardening_soil;
+  check_parameters(law);
+  const double initial = 2 * law.secant_modulus / (2 - law.failure_ratio);
+  require(law.unloading_modulus > initial, "unloading_modulus", law.unloading_modulus,
+          "above the initial modulus of first loading, 2 secant_modulus / (2 - failure_ratio) = " +
+              number_text(initial) + " Pa");
+  const Soil soil = uncapped(law);
+  const Oedometer test = oedometer_of(law, soil);
+  const double k0 = normal_k0(law);
+  require(test.mobilised < 1, "normal_k0", k0,
+          "so large that the strength carries level ground under the reference pressure");
+  const double most = std::min(1 / std::max(test.volumetric, 0.0), 2.0 / 3 / test.deviatoric);
+  require(law.oedometer_modulus < most, "oedometer_modulus", law.oedometer_modulus,
+          "below " + number_text(most) +
+              " Pa, the modulus that the other parameters give without a cap (a smaller secant_modulus or "
+              "unloading_modulus "
+              "would be softer)");
+}
+
+template <int D>
+double smallest_stress(const HardeningSoil& law, const SymTensor<D>& stress)
+{
+  const auto [q, direction] = hardening_soil::shape_of<D>(hardening_soil::uncapped(law), deviator<D>(stress));
+  return -mean<D>(stress) - direction.smallest * q;
+}
+
+double attraction(const HardeningSoil& law) { return hardening_soil::uncapped(law).attraction; }
+
+double unloading_modulus(const HardeningSoil& law, double stress)
+{
+  const hardening_soil::Soil soil = hardening_soil::uncapped(law);
+  const double above = std::max(stress + soil.attraction, soil.least);
+  return law.unloading_modulus * std::pow(above / soil.reference, law.exponent);
+}
+
+double shear_modulus(const HardeningSoil& law) { return 0.5 * law.unloading_modulus / (1 + law.poisson); }
+
+double p_wave_modulus(const HardeningSoil& law)
+{
+  return law.unloading_modulus * (1 - law.poisson) / ((1 + law.poisson) * (1 - 2 * law.poisson));
+}
+
+template <int D>
+std::array<double, 2> hardened_to(const HardeningSoil& law, const SymTensor<D>& stress, double overconsolidation)
+{
+  using namespace hardening_soil;
+  const Soil soil = soil_of(law);
+  const auto [q, direction] = shape_of<D>(soil, deviator<D>(stress));
+  const double pressure = soil.attraction - mean<D>(stress), smallest = pressure - direction.smallest * q;
+  const double above = std::max(smallest, soil.least), largest = smallest + direction.difference * q - soil.attraction;
+  Soil before = soil;
+  if (overconsolidation > 1)
+    set_start(before, law, std::max(overconsolidation * largest, 0.0));
+  const double mobilised = std::min(direction.difference * q / (soil.slope * above), 1.0);
+  const double shear = std::max({before.shear, soil.shear, shear_of(soil, above, mobilised)});
+  const double cap = std::max({before.cap, soil.cap, cap_through(soil, pressure, q, direction.cap)});
+  return {shear - soil.shear, std::log(cap / soil.cap)};
+}
+
+template <int D>
+BatchReport update(const HardeningSoil& law, const PointBatch<D>& points)
+{
+  const hardening_soil::Soil soil = hardening_soil::soil_of(law);
+  return update_side_by_side(
+      points, [](Index) { return std::optional<Index>{}; },
+      [&](Index i, double* tangent) { return hardening_soil::update_point<D>(soil, points, i, tangent); });
+}
+
+template double smallest_stress<2>(const HardeningSoil&, const SymTensor<2>&);
+template double smallest_stress<3>(const HardeningSoil&, const SymTensor<3>&);
+template std::array<double, 2> hardened_to<2>(const HardeningSoil&, const SymTensor<2>&, double);
+template std::array<double, 2> hardened_to<3>(const HardeningSoil&, const SymTensor<3>&, double);
+template BatchReport update<2>(const HardeningSoil&, const PointBatch<2>&);
+template BatchReport update<3>(const HardeningSoil&, const PointBatch<3>&);
+} // namespace mpm::materials
