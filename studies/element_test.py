@@ -30,7 +30,7 @@ import mpm_core as mpm
 
 SOFTEST = 10e3
 """Oedometric modulus [Pa] below which there is no soil: mud has some 50 kPa"""
-OWN_STIFFNESS = ("cam-clay", "nor-sand", "sanisand")
+OWN_STIFFNESS = ("cam-clay", "nor-sand", "sanisand", "hardening-soil")
 """Laws whose stiffness follows from the pressure"""
 PRECONSOLIDATED = {"cam-clay": ("--preconsolidation", 1.0), "nor-sand": ("--image-pressure", np.e)}
 """Laws that yield under an isotropic pressure, the options that set it, and how many times their value it is, attraction included"""

@@ -102,7 +102,8 @@ def is_profile(value: dict) -> bool:
     return set(value) == {"value", "per_metre", "top"} and all(map(is_number, value.values()))
 
 
-LEAST = {"young": 1e5, "cohesion": 50.0, "shear_strength": 50.0}
+MODULI = ("young", "secant_modulus", "oedometer_modulus", "unloading_modulus")
+LEAST = dict.fromkeys(MODULI, 1e5) | {"cohesion": 50.0, "shear_strength": 50.0}
 """Parameters [Pa] below which a soil of a site is probably given in kPa or MPa"""
 
 

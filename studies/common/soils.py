@@ -22,6 +22,7 @@ MATERIALS = (
     "tresca",
     "von-mises",
     "drucker-prager",
+    "hardening-soil",
     "cam-clay",
     "nor-sand",
     "sanisand",
@@ -36,7 +37,7 @@ TOYOURA = {
 """SANISAND of Toyoura sand (Dafalias & Manzari 2004, table 1), and where it begins unless said otherwise"""
 
 
-FRICTIONAL = ("mohr-coulomb", "viscoplastic", "softening", "drucker-prager")
+FRICTIONAL = ("mohr-coulomb", "viscoplastic", "softening", "drucker-prager", "hardening-soil")
 ONLY_WITH = {
     ("--viscosity",): ("viscoplastic",),
     ("--residual-cohesion", "--residual-friction-angle", "--softening-strain", "--reference-length"): ("softening",),
@@ -45,10 +46,12 @@ ONLY_WITH = {
     ("--critical-void-ratio", "--critical-compression", "--dilatancy", "--hardening", "--rigidity", "--image-pressure",
      "--coupling"): ("nor-sand",),
     ("--sanisand",): ("sanisand",),
+    ("--secant-modulus", "--oedometer-modulus", "--unloading-modulus", "--unloading-poisson", "--stiffness-exponent",
+     "--normal-k0", "--failure-ratio", "--vertical-preconsolidation", "--reference-pressure"): ("hardening-soil",),
     ("--friction-angle", "--dilation-angle", "--tension-cutoff"): FRICTIONAL,
     ("--cohesion",): (*FRICTIONAL, "tresca", "von-mises"),
-    ("--young",): tuple(name for name in MATERIALS if name not in ("cam-clay", "nor-sand", "sanisand")),
-    ("--poisson",): tuple(name for name in MATERIALS if name != "sanisand"),
+    ("--young",): tuple(name for name in MATERIALS if name not in ("cam-clay", "nor-sand", "sanisand", "hardening-soil")),
+    ("--poisson",): tuple(name for name in MATERIALS if name not in ("sanisand", "hardening-soil")),
 }  # fmt: skip
 """Options that only some laws have"""
 
@@ -82,6 +85,11 @@ def add_law_options(
     for name, default in [("critical_void_ratio", 1.0), ("critical_compression", 0.03), ("dilatancy", 4.0), ("hardening", 100.0),
                           ("rigidity", 200.0), ("image_pressure", 20e3), ("coupling", 0.2)]:  # fmt: skip
         add_parameter(p, mpm.NorSand, name, default, "NorSand: ")
+    for name, default, option in [("secant_modulus", 30e6, None), ("oedometer_modulus", 30e6, None), ("unloading_modulus", 90e6, None),
+                                  ("poisson", 0.2, "--unloading-poisson"), ("exponent", 0.5, "--stiffness-exponent"),
+                                  ("normal_k0", 0.0, None), ("failure_ratio", 0.9, None), ("vertical_preconsolidation", 0.0, None),
+                                  ("reference_pressure", 100e3, None)]:  # fmt: skip
+        add_parameter(p, mpm.HardeningSoil, name, default, "Hardening Soil: ", option)
     p.add_argument("--sanisand", nargs="*", default=[], metavar="NAME=VALUE",
                    help="SANISAND: parameters that differ from those of Toyoura sand, such as void_ratio=0.75 dilatancy=0.5; "
                         "docs/api/law_parameters.md has all of them with their units")  # fmt: skip
@@ -245,6 +253,13 @@ def _skeleton(a: argparse.Namespace) -> Any:
                 critical_slope=a.critical_slope, dilatancy=a.dilatancy, hardening=a.hardening, rigidity=a.rigidity,
                 poisson=a.poisson, image_pressure=a.image_pressure, void_ratio=a.void_ratio, coupling=a.coupling,
                 attraction=a.attraction,
+            )  # fmt: skip
+        case "hardening-soil":
+            return mpm.HardeningSoil(
+                **strength, secant_modulus=a.secant_modulus, oedometer_modulus=a.oedometer_modulus,
+                unloading_modulus=a.unloading_modulus, poisson=a.unloading_poisson, exponent=a.stiffness_exponent,
+                normal_k0=a.normal_k0, failure_ratio=a.failure_ratio,
+                vertical_preconsolidation=a.vertical_preconsolidation, reference_pressure=a.reference_pressure,
             )  # fmt: skip
         case "sanisand":
             return sanisand_of(a.sanisand)
