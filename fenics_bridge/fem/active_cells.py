@@ -76,7 +76,8 @@ def given_stress(model: Any, stress: Any, new: Any) -> NDArray[np.float64] | Non
     """Initial stress of the new points: (k, S) [Pa]; None for none."""
     if stress is None:
         return None
-    given = real_numbers(model.domain.comm, "stress", stress(model.points.coordinates()[new]))
+    values = stress(model.points.coordinates()[new]) if callable(stress) else stress[new]
+    given = real_numbers(model.domain.comm, "stress", values)
     expected = int(new.sum()), model.points.size
     good = given.shape == expected and np.all(np.isfinite(given))
     agree(model.domain.comm, None if good else f"stress has shape {given.shape}, expected finite {expected}")

@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 from mpm_core.members import Member
+from numpy.typing import NDArray
 
 from fenics_bridge.compat import cell_dofs
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.active_cells import cells_there, switch_off
+from fenics_bridge.fem.at_rest import rows_of, stress_at_rest, warn_beyond_strength
 from fenics_bridge.fem.load_steps import LoadStep
 from fenics_bridge.fem.loads import Load
 from fenics_bridge.fem.quasi_static import QuasiStatic
@@ -90,11 +92,17 @@ class FemSite:
         """
         fem = self.fem
         state, _, _ = self.state.after(stage)
+        k0 = state.k0_of(stage)
+        given = stress_at_rest(fem, state, self._off(state.there), self._laws(state), k0, self.state.there) if k0 else None
         if stage.reset_displacement:
             fem.reset_displacement()
         if replaced := set(stage.remove).intersection(stage.install):
             fem.reconfigure(members={name: one for name, one in fem.members.items() if name not in replaced})
-        steps = fem.solve(self._enter(state, stage.stress), **self._options)
+        load = self._enter(state, stage.stress if given is None else given)
+        if given is not None:
+            rows = rows_of(fem, k0)
+            warn_beyond_strength(fem.domain.comm, f"stage {stage.name!r}: ", given[rows], fem.points.stress[rows])
+        steps = fem.solve(load, **self._options)
         self.number += 1
         if not fem.converged:
             raise StageError(self._failure(stage, steps), 1.0 - fem.load.held)
@@ -152,7 +160,7 @@ class FemSite:
         active = cells_there(self.fem.domain, self.fem.cell_tags, off) if off else None
         self.fem.require_members(members, active, where)
 
-    def _enter(self, state: SiteState, stress: OfPosition | None = None) -> Load:
+    def _enter(self, state: SiteState, stress: OfPosition | NDArray[np.float64] | None = None) -> Load:
         """Change the body to a state; returns the state's load, which does not act yet. stress: of soils that are placed."""
         off = self._off(state.there)
         self.fem.reconfigure(off, state.supports, state.pore_pressure, stress, self._laws(state), state.members)

@@ -163,7 +163,7 @@ class QuasiStatic(ReinforcedBody, WetBody, SupportedBody, PointFunctions):
         off: Sequence[int | str] | None = None,
         supports: Sequence[Support] | None = None,
         pore_pressure: OfPosition | None = None,
-        stress: OfPosition | None = None,
+        stress: OfPosition | NDArray[np.float64] | None = None,
         law: Laws | None = None,
         members: dict[str, Member] | None = None,
     ) -> None:
@@ -180,7 +180,8 @@ class QuasiStatic(ReinforcedBody, WetBody, SupportedBody, PointFunctions):
             supports: boundary conditions, as for the constructor; None for the present ones, where they are now.
             pore_pressure: function of positions (n, D) [m] that returns pore pressures (n,) [Pa], zero where there is no water; None
                 for the present ones.
-            stress: function of positions (n, D) [m] that returns the stresses (n, S) [Pa] of the cells that become active.
+            stress: function of positions (n, D) [m] that returns the stresses (n, S) [Pa] of the cells that become active, or an array (n, S) at
+                `points.coordinates()`, of which they take theirs.
             law: law, or laws by cell tag, from now on; where the law changes, its state is reset.
             members: the structural members that are there from now on by name, from `mpm_core.bar`, `strut` and `beam`; {} for
                 none, None for the present ones. A new one is installed without strain, as the soil is deformed now, and with its

@@ -52,6 +52,9 @@ class Stage:
     of the soil where there is pore pressure at it"""
     stress: OfPosition | None = None
     """Function of positions (n, D) [m] that returns the stresses (n, S) [Pa] with which the soils of `fill` come, e.g. by K0"""
+    k0: dict[int | str, float] = field(default_factory=dict)
+    """K0 by soil of `fill`, instead of `stress`: these soils come with stresses in equilibrium under their weight, whose horizontal part is K0
+    times the vertical one, both effective; in axial symmetry that along the radius and that around the axis"""
     reset_displacement: bool = False
     """Whether displacements count from the beginning of this stage"""
     install: dict[str, Member] = field(default_factory=dict)
@@ -242,6 +245,8 @@ class SiteState:
         agree(self._comm, _wrong_value(stage, where) or _wrong_member(stage, where, self.members))
         new.law = self.law | self._by_soil(where + "law", stage.law)
         new.unit_weight = self.unit_weight | self._by_soil(where + "unit_weight", stage.unit_weight)
+        not_placed = next((key for key in stage.k0 if set(self._cells_of(key, where + "k0")).difference(fill)), None)
+        agree(self._comm, None if not_placed is None else f"{where}k0 is given for {not_placed!r}, expected a soil of fill")
         without = [tag for tag in new.there if tag not in new.unit_weight]
         agree(self._comm, f"{where}unit_weight: the soil {self._name_of(without[0])} has none" if without else None)
         pressure = {n: p for key, p in stage.pressure.items() for n in self._facets_of(key, where + "pressure")}
@@ -278,6 +283,10 @@ class SiteState:
             self._facets_of(support.facet_tag, where + "support")
         return (*kept, *stage.support)
 
+    def k0_of(self, stage: Stage) -> dict[int, float]:
+        """K0 of the soils that a stage places, by their tags."""
+        return self._by_soil(f"stage {stage.name!r}: k0", stage.k0)
+
     def _numbers(self, argument: str, names: Any) -> Any:
         return tuple(dict.fromkeys(n for name in names for n in self._cells_of(name, argument)))
 
@@ -298,7 +307,7 @@ def _wrong_member(stage: Stage, where: str, there: Mapping[str, Member]) -> str 
 
 def _wrong_value(stage: Stage, where: str) -> str | None:
     """Error in the values of a stage; None without an error."""
-    for name in ("unit_weight", "pressure", "law"):
+    for name in ("unit_weight", "pressure", "law", "k0"):
         if not isinstance(getattr(stage, name), dict):
             what = "boundary" if name == "pressure" else "soil"
             return f"{where}{name} is {getattr(stage, name)!r}, expected a dictionary by {what}"
@@ -312,6 +321,11 @@ def _wrong_value(stage: Stage, where: str) -> str | None:
         for key, value in getattr(stage, name).items():
             if not is_finite(value):
                 return f"{where}{name} is {value!r} for {key!r}, expected a finite number"
+    for key, value in stage.k0.items():
+        if not (is_finite(value) and value > 0):
+            return f"{where}k0 is {value!r} for {key!r}, expected a number above 0"
+    if stage.k0 and stage.stress is not None:
+        return f"{where}stress and k0 are given, expected one of them"
     for key, law in stage.law.items():
         if not isinstance(law, tuple(_core.law_types)):
             return f"{where}law is {law!r} for {key!r}, expected a constitutive law such as MohrCoulomb(...)"

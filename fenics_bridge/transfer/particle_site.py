@@ -15,6 +15,7 @@ from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport
 from fenics_bridge.fem.supports import Support, not_supports
 from fenics_bridge.transfer.handover import Handover, initialise
 from fenics_bridge.transfer.particle_forces import boundary_forces, seepage_forces
+from fenics_bridge.transfer.particles_at_rest import place_at_rest, stress_at_rest
 
 
 class ParticleSite:
@@ -103,12 +104,18 @@ class ParticleSite:
         agree(model.comm, problem)
         self._refuse_resting(state, stage)
         self._refuse_occupied(fill, stage)
+        k0, laws = state.k0_of(stage), {tag: model.laws[material[tag]] for tag in state.there}
+        at_rest = stress_at_rest(self, state, laws, k0, gravity=self._g, per_cell=self._per_cell, **self._options) if k0 else {}
         if stage.reset_displacement:
             model.particles.set("initial_position", model.particles.position)
         model.remove(np.isin(model.mesh.cell_tags[model.particles.cell], excavate))
         self._change_laws(material)
+        first = model._next_id
         for tag in fill:
             self._fill(tag, state.unit_weight[tag], stage)
+        if at_rest:
+            placed = {tag: self.rows_of(tag) & (model.particles.id >= first) for tag in at_rest}
+            place_at_rest(model, at_rest, placed, f"stage {stage.name!r}: ")
         self._weigh(state)
         apply_supports(model, state.supports)
         self._load(state)

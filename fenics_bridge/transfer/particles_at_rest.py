@@ -1,0 +1,89 @@
+"""Ground at rest by particles: the stresses by K0 of soils that a stage places, as `at_rest` has them for finite elements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import mpm_core as mpm
+from fenics_bridge.errors import agree
+from fenics_bridge.fem.at_rest import laws_at_rest, warn_beyond_strength
+from fenics_bridge.fem.stages import SiteState, Stage, StageError
+from fenics_bridge.types import Law
+
+if TYPE_CHECKING:
+    from fenics_bridge.transfer.particle_site import ParticleSite
+
+
+def stress_at_rest(
+    site: ParticleSite, state: SiteState, laws: Mapping[int, Law], k0: Mapping[int, float], **options: Any
+) -> dict[int, NDArray[np.float64]]:
+    """Stresses at rest of the particles that are to be placed, by the tag of their soil, in the order of their numbers. Collective.
+
+    They are those of other particles in the same cells, which keep their places. Soil that was there before counts as being where it
+    was placed.
+
+    Args:
+        site: the particles, before the stage.
+        state: soils, supports, loads and water that the stage leads to.
+        laws: laws by cell tag of the soils that are there.
+        k0: ratio of horizontal to vertical stress [-], by the tags of soils that are placed.
+        **options: of the site.
+
+    Raises:
+        InputError: the elastic body has no equilibrium. Raised on all ranks alike.
+    """
+    comm, resting = site.model.comm, laws_at_rest(laws, k0, site.state.there)
+    model = mpm.Model(site.model.mesh, list(resting.values()), geometry=site.model.geometry)
+    numbers = {tag: number for number, tag in enumerate(resting)}
+    twin = type(site)(model, numbers, state.supports, **{**options, "small_displacements": True})
+    weights = {tag: state.unit_weight[tag] for tag in state.there}
+    stage = Stage("at rest", state.there, unit_weight=weights, pressure=state.pressure, pore_pressure=state.pore_pressure)
+    problem = None
+    try:
+        twin.carry_out(stage)
+    except StageError as error:
+        problem = f"k0: the ground at rest has no equilibrium: {error}"
+    agree(comm, problem)
+    return {tag: _in_order(model, twin.rows_of(tag)) for tag in k0}
+
+
+def _in_order(model: mpm.Model, rows: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Stresses of some particles in the order of their numbers."""
+    p = model.particles
+    return p.stress[rows][np.argsort(p.id[rows])]
+
+
+def place_at_rest(
+    model: mpm.Model, stress: Mapping[int, NDArray[np.float64]], rows_of: Mapping[int, NDArray[np.bool_]], where: str
+) -> None:
+    """Give the particles that a stage has placed their stresses at rest; warns where these are beyond the strength. Collective.
+
+    Args:
+        model: the particles.
+        stress: stresses by the tag of the soil, from `stress_at_rest`.
+        rows_of: whether each particle is one that the stage has placed, by the tag of its soil.
+        where: stage, for the warning.
+    """
+    p = model.particles
+    every, chosen = p.stress.copy(), np.zeros(len(p), dtype=bool)
+    for tag, given in stress.items():
+        rows = np.flatnonzero(rows_of[tag])
+        every[rows[np.argsort(p.id[rows])]], chosen[rows] = given, True
+    p.set("stress", every)
+    warn_beyond_strength(model.comm, where, every[chosen], admissible(model)[chosen])
+
+
+def admissible(model: mpm.Model) -> NDArray[np.float64]:
+    """Stresses of the particles (n, S) [Pa], brought back to the strength of their laws."""
+    p = model.particles
+    stress, material = p.stress.copy(), p.material
+    for number, law in enumerate(model.laws):
+        rows = np.flatnonzero(material == number)
+        part, state = stress[rows], np.ascontiguousarray(p.state[rows, : law.n_state])
+        law.update(np.zeros_like(part), part, state)
+        stress[rows] = part
+    return stress
