@@ -120,7 +120,7 @@ def drawn(found: CollapseRuns, spiral: bridge.LogSpiral, folder: Path) -> Pictur
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     if a.site is not None:
-        return site_study(a, weight_factor, "collapse_weight_factor", "Factor of all unit weights [-]")
+        return site_study(a, weight_factor, "collapse_weight_factor", "Factor of all unit weights [-]", at_rest=False)
     start = perf_counter()
     folder = open_results(a, comm)
     spiral = bridge.log_spiral(a.height, a.angle, a.cohesion, a.friction_angle, a.crest, depth=a.depth)

@@ -24,6 +24,7 @@ from common.quiet import NOT_REACHED, without_warning
 from common.ranks import run_study
 from common.results import open_results
 from common.site_file import Site
+from common.site_k0 import begin_at_rest, say_left_out
 from common.site_runs import add_site_option, check_site_options, site_study
 from common.slope_case import GRAVITY, SUPPORTS, soil_of
 from common.slope_fem import (
@@ -222,19 +223,20 @@ def site_load(site: Site, model: bridge.QuasiStatic) -> bridge.Load:
     """Its load, after its stages if it has some. Collective.
 
     They are placed at once, since the factor hardly depends on stresses before failure. But soil with friction whose water does not
-    drain has the strength of its effective stress when it ceases to drain: stages in which that happens are carried out.
+    drain has the strength of its effective stress when it ceases to drain: stages in which that happens are carried out, as are those of
+    a site with K0.
 
     Raises:
         RunError: a stage that is carried out has no equilibrium.
     """
-    if not site.stages:
-        return site.load()
-    stages = bridge.FemSite(model)
-    if not any(keeps_effective_stress(law) for stage in site.stages for law in stage.law.values()):
-        return stages.place(site.stages)
+    undrains = any(keeps_effective_stress(law) for stage in site.stages for law in stage.law.values())
+    if not (undrains or site.k0):
+        return bridge.FemSite(model).place(site.stages) if site.stages else site.load()
     try:
-        for _ in bridge.carry_out(stages, site.stages):
-            pass
+        if site.stages:
+            list(bridge.carry_out(bridge.FemSite(model), site.stages))
+        else:
+            begin_at_rest(site, model)
     except bridge.StageError as error:
         raise mpm.RunError(
             f"there is no equilibrium to find a factor of safety of, which is below 1: {error}"
@@ -252,12 +254,12 @@ def keeps_effective_stress(law: Any) -> bool:
 
 
 def warn_of_undrained_weight(site: Site) -> None:
-    """Warn of soil with friction that is placed undrained, so that its own weight presses on its water only. Collective."""
-    names = [name for name, tags in bridge.names_of(site.cell_tags).items()
-             if any(keeps_effective_stress(site.laws[tag]) for tag in tags if tag in site.laws)]  # fmt: skip
+    """Warn of soil with friction that is placed undrained, so that its own weight presses on its water only, but for soil with K0. Collective."""
+    names = [name for name, tags in bridge.names_of(site.cell_tags).items() if name not in site.k0
+             and any(keeps_effective_stress(site.laws[tag]) for tag in tags if tag in site.laws)]  # fmt: skip
     if names:
         say(f"the water of {', '.join(map(repr, names))} bears the weight of this soil, too, which is placed undrained: its friction gives hardly "
-            "any strength. Ground that has drained under its weight has the law of drained soil first, and by `law` of a later stage that of "
+            "any strength. Ground that has drained under its weight has k0, or the law of drained soil first, and by `law` of a later stage that of "
             "undrained soil (docs/howto/stages.md)")  # fmt: skip
 
 
@@ -298,6 +300,8 @@ def main(arguments: list[str] | None = None) -> int:
             return bridge.factor_of_safety(model, load, start=a.start, progress=progress, unreduced=unreduced)
 
         def more(site):
+            if a.particles:
+                say_left_out(site.k0, "particles")
             found = particle_summary(site_by_particles(a, site)) if a.particles else {}
             if a.critical_seismic:
                 model = site.finite_elements(**finite_elements(a))

@@ -159,16 +159,26 @@ class ConsolidationSite:
         )
         pressure = flow.pore_pressure(suction=True)
         self._require_members(fem)
-        fem.reconfigure(off=off, pore_pressure=pressure, members=dict(self.stages[0].members))
-        fem.solve(self.load(0.0))
-        if not fem.converged:
-            raise mpm.RunError("the ground has no equilibrium under its weight and the initial pressures")
+        self._carry_weight(fem, pressure)
         model = water.Consolidation(domain, self.site.laws, self.soils, facet_tags, self.site.supports, self.boundary,
                                     load=self.load, element=element, nmd=nmd, cell_tags=cell_tags,
                                     geometry=self.site.geometry)  # fmt: skip
         model.reconfigure(off=off)
         model.initialise(fem, pressure)
         return model
+
+    def _carry_weight(self, fem: bridge.QuasiStatic, pressure: Any) -> None:
+        """Bring new elements to the equilibrium of the beginning; pressure: of the water, a function of positions [Pa]. Collective."""
+        there, load = [soil for soil in self.soils if soil not in self.stages[0].off], self.load(0.0)
+        k0 = {soil: value for soil, value in self.site.k0.items() if soil in there}
+        stage = bridge.Stage("beginning", there, unit_weight=self.site.unit_weight, pressure=load.pressure, k0=k0,
+                             pore_pressure=pressure, install=dict(self.stages[0].members))  # fmt: skip
+        try:
+            bridge.FemSite(fem).carry_out(stage)
+        except bridge.StageError as error:
+            raise mpm.RunError(
+                f"the ground has no equilibrium under its weight and the initial pressures: {error}"
+            ) from error
 
     def _require_members(self, fem: bridge.QuasiStatic) -> None:
         """Require that the members of all stages are in soil that is there then. Collective.

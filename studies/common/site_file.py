@@ -8,6 +8,7 @@ Example of a file:
 
     [soils.clay]                       # a physical group of the mesh
     unit_weight = 17e3                 # N/m3
+    k0 = 0.8                           # horizontal over vertical effective stress of soil that is there from the beginning
     material = "tresca"                # and the parameters of the law, named as the options of the study slope
     young = 3e6
     cohesion = {value = 12e3, per_metre = 1.5e3, top = 3.0}    # grows with depth below the height `top`;
@@ -45,6 +46,7 @@ from .checks import say
 from .site_doubts import warn_of_depth, warn_of_pressures, warn_of_water
 from .site_fields import SoilField, fields_of, values_of, varying
 from .site_interfaces import fractions_of, in_stages, split_beside, weakened
+from .site_k0 import k0_of, with_k0
 from .site_keys import CHANGES, STAGE_WATER, changes_of, member_of, part_of, read_site_table, require_push
 from .site_laws import is_number, law_at, law_keys, located, unit_doubt, unit_weight_of
 from .site_mesh import check_soils, geometry_of, site_mesh
@@ -60,7 +62,7 @@ class Site:
     domain, cell_tags, facet_tags: the whole mesh, with cells that never hold soil; soils: names, in the file's order
     laws: by cell tag; unit_weight: by soil [N/m3]; supports: of `fenics_bridge`; stages: as for `carry_out`
     further_laws: those that come in by stages; members: structural ones by name, of stages; axisymmetric: whether it is a half section; stage_rows: stages as in the file
-    random: parameters of soils that are random fields
+    random: parameters of soils that are random fields; k0: ratio of horizontal to vertical effective stress by soil, of those that have one
     """
 
     domain: Any
@@ -76,6 +78,7 @@ class Site:
     stage_rows: Sequence[dict[str, Any]] = ()
     members: dict[str, mpm.Member] = field(default_factory=dict)
     random: Sequence[SoilField] = ()
+    k0: dict[str, float] = field(default_factory=dict)
 
     @property
     def geometry(self) -> mpm.Geometry | None:
@@ -86,7 +89,7 @@ class Site:
         """Elements of all soils, with a law for each tag; options: further ones of `QuasiStatic`. Collective.
 
         Linear elements average volumetric strains where a soil of the site keeps its volume, unless `nmd` says otherwise. Without
-        stages all structural members are there.
+        stages all structural members are there, with K0 from `begin_at_rest` on.
         """
         options.setdefault("nmd", degree == 1 and keeps_volume([*self.laws.values(), *self.further_laws]))
         body, cell_tags, facet_tags = self.body()
@@ -101,7 +104,7 @@ class Site:
             **options,
         )
         self.vary(fem, laws or self.laws)
-        if self.members and not self.stages:
+        if self.members and not self.stages and not self.k0:
             fem.reconfigure(members=self.members)
         return fem
 
@@ -248,7 +251,7 @@ def site_of(
     at_once = interfaces or (interfaces is None and not rows)
     laws = weakened(laws, beside, at_once)
     site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, supports_of(table, path, domain, facet_tags), [],
-                list(others.values()), axisymmetric, rows, members, random)  # fmt: skip
+                list(others.values()), axisymmetric, rows, members, random, k0_of(soils, path))  # fmt: skip
     site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(rows)]
     if beside.walls and not at_once:
         site.stages, further = in_stages(site.stages, laws, beside, lambda soil: site.tags_of([soil]))
@@ -260,7 +263,8 @@ def site_of(
         )
     placed = {soil for stage in site.stages for soil in stage.fill}
     left = {soil: weight for soil, weight in weights.items() if soil not in placed}
-    if rows and left and "day" in rows[0]:  # what these stages do not place is there before them
+    begins_later = bool(rows and left and "day" in rows[0])
+    if begins_later:  # what these stages do not place is there before them
         site.stages[0] = replace(site.stages[0], reset_displacement=True)
         site.stages.insert(0, bridge.Stage("beginning", fill=list(left), unit_weight=left))
     elif rows and left:
@@ -268,6 +272,7 @@ def site_of(
         say(
             f"{path}: no stage fills the cells of {names}, which therefore hold no soil; name it in fill of a stage where it is there"
         )
+    site.stages = with_k0(site.stages, site.k0, begins_later or not rows or "day" not in rows[0], path)
     return site
 
 

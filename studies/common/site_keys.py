@@ -11,6 +11,7 @@ import mpm_core as mpm
 from fenics_bridge import water
 
 from .parameters import unknown_key
+from .site_k0 import KEY as K0
 from .site_laws import STRENGTHS, is_number, law_keys, located
 from .site_tables import MOST_FILES, merged, parsed
 
@@ -98,7 +99,7 @@ def _extended(path: Path, depth: int = 1) -> dict[str, Any]:
     """The file of a site as a table, over those that it extends; depth: number of this file among them."""
     table = parsed(path)
     _require_known(table, KEYS, str(path))
-    for key, known in (("soils", (*FLOW, "unit_weight", *law_keys())), ("laws", law_keys()), ("boundaries", WATER)):
+    for key, known in (("soils", (*FLOW, "unit_weight", K0, *law_keys())), ("laws", law_keys()), ("boundaries", WATER)):
         for name, given in _table_at(table, key, str(path)).items():
             _require_known(given, known, f"{path}: {key}.{name}")
     if "extends" not in table:

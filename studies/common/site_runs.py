@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from argparse import Namespace
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
@@ -22,6 +23,7 @@ from .quiet import NOT_REACHED, without_warning
 from .results import open_results
 from .site_field_plots import random_pictures
 from .site_file import Site, read_site
+from .site_k0 import say_left_out
 from .site_mesh import cell_size_of
 from .slope_fem import finite_elements, step_line
 from .summary import write_summary
@@ -58,6 +60,7 @@ def site_study(
     label: str,
     more: Callable[[Site], dict] = lambda site: {},
     at_once: bool = True,
+    at_rest: bool = True,
 ) -> int:
     """A study on a site instead of the slope; returns its exit code. Collective.
 
@@ -67,14 +70,18 @@ def site_study(
         name: of the value in the summary; label: of its axis, with unit.
         more: function of the site on the finest mesh that returns further entries of the summary.
         at_once: whether anything of it has all soils at once, without what stages change, so that a warning is due.
+        at_rest: whether the value is found from the stresses by K0; else a warning is due.
     """
     comm, start = MPI.COMM_WORLD, perf_counter()
     finest = a.cell_size or cell_size_of(a.site)
     sizes = [finest * 2**k for k in reversed(range(a.meshes))] if finest else [None]
     site, runs = read_site(a.site, comm, sizes[0]), []
     folder = open_results(a, comm)
+    if not at_rest:
+        say_left_out(site.k0, str(a.site))
     for size in sizes:
         site = site if size == sizes[0] else read_site(a.site, comm, size)
+        site = site if at_rest else replace(site, k0={})
         cells = "site" if size is None else f"cells of {size:g} m"
         progress = step_line(cells, label[0].lower() + label[1:])
         model = site.finite_elements(**finite_elements(a))

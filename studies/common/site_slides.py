@@ -36,7 +36,8 @@ from .results import open_results
 from .scenes import scene_of
 from .schemes import add_particles_per_cell, add_pic
 from .site_field_plots import random_pictures
-from .site_file import read_site
+from .site_file import Site, read_site
+from .site_k0 import begin_at_rest
 from .summary import write_summary
 
 comm = MPI.COMM_WORLD
@@ -165,6 +166,20 @@ def slide_pictures(a: Namespace, result: Slide, scene: Scene | None, folder: Pat
     return pictures
 
 
+def _carry_weight(site: Site, fem: bridge.QuasiStatic, path: Path) -> None:
+    """Bring the elements of a site to equilibrium under the weight of all soils; path: of its file, for the error. Collective."""
+    if site.k0:
+        try:
+            return begin_at_rest(site, fem)
+        except bridge.StageError as error:
+            raise mpm.InputError(f"{path}: its soils do not carry their weight: {error}") from error
+    steps = fem.solve(site.load())
+    if not fem.converged:
+        reason = next(step.report.reason for step in reversed(steps) if not step.converged)
+        carried = max((step.value for step in steps if step.converged), default=0.0)
+        raise mpm.InputError(f"{path}: its soils carry {carried:.1%} of their weight only: {reason}")
+
+
 def site_slide(a: Namespace) -> int:
     """A site in elasto-plastic equilibrium under its weight, whose soils then lose strength and slide; returns its exit code.
 
@@ -181,11 +196,7 @@ def site_slide(a: Namespace) -> int:
     nmd = averages(a, site.laws.values())
     fem = site.finite_elements(1, nmd=nmd, solver=bridge.Solver(tolerance=1e-10), as_particles=nmd)
     with without_warning(NOT_REACHED):  # said by the error
-        steps = fem.solve(site.load())
-    if not fem.converged:
-        reason = next(step.report.reason for step in reversed(steps) if not step.converged)
-        carried = max((step.value for step in steps if step.converged), default=0.0)
-        raise mpm.InputError(f"{a.site}: its soils carry {carried:.1%} of their weight only: {reason}")
+        _carry_weight(site, fem, a.site)
     random = random_pictures(site, fem, folder) if a.pictures else {}
     model = site.particles(a.particles_per_cell, more=site.weaker_laws(a.factor))
     handover = bridge.initialise(model, fem, count_displacement=False, nmd=nmd, equilibrate=not fem.members)
