@@ -2,7 +2,8 @@
 
 They are those of an elastic body, loaded by the weight, water and pressures of the stage, whose stiffness makes the horizontal stress K0 times
 the vertical one where the ground does not strain sideways. So they are in equilibrium in any body and with any elements: level ground has exactly K0,
-and a slope what its surface leaves of it. For K0 = nu / (1 - nu) it is the body of Young's modulus and Poisson's ratio.
+and a slope what its surface leaves of it. Up to K0 = 0.8 the body is isotropic, with Poisson's ratio K0 / (1 + K0). All soils have the same
+modulus of vertical strain, so that stiff soil beside soft soil does not carry the weight of both.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ from mpm_core import _core
 if TYPE_CHECKING:
     from fenics_bridge.fem.stages import SiteState
 
+MODULUS = 1e7
+"""Modulus of vertical strain without lateral strain [Pa]; stresses do not depend on it"""
+
 LARGEST_POISSON = 0.45
 """Poisson's ratio that stands for larger ones: linear elements would lock, and stresses of level ground do not depend on it"""
 
@@ -42,24 +46,24 @@ class GroundAtRest:
     """Elastic ground with K0 as a law in Python: sigma = M w (w . e) + S e_h + G gamma.
 
     M is the modulus of vertical strain without lateral strain, w is 1 for the vertical and K0 for both horizontal axes, S is the stiffness
-    E / (1 - nu^2) [[1, nu], [nu, 1]] of the horizontal strains in plane stress, and G the shear modulus.
+    E / (1 - nu^2) [[1, nu], [nu, 1]] of the horizontal strains in plane stress, and G the shear modulus; E and G are those of M and nu in isotropic
+    ground, which this is for nu = K0 / (1 + K0).
 
     Args:
-        law: law of the soil, whose elastic moduli it takes, of drained soil; where stiffness depends on the pressure, those of its waves.
-        k0: ratio of horizontal to vertical stress [-]; None for isotropic ground.
+        law: law of the soil.
+        k0: ratio of horizontal to vertical stress [-]; None for that of its elasticity.
         factor: of all moduli [-].
     """
 
     n_state = 1
 
     def __init__(self, law: Law, k0: float | None, factor: float = 1.0) -> None:
-        self.k0, self.factor = k0, factor
-        self.p_wave_modulus = law.p_wave_modulus
-        drained = list(with_inner_laws(law))[-1]
-        self.shear, wave = factor * drained.shear_modulus, factor * drained.p_wave_modulus
-        self.poisson = float(np.clip((wave - 2 * self.shear) / (2 * (wave - self.shear)), 0.0, LARGEST_POISSON))
+        self.p_wave_modulus = law.p_wave_modulus  # elements average by it, of this law as of that of the soil
+        poisson = _drained_poisson(law) if k0 is None else k0 / (1 + k0)
+        self.poisson, self.modulus = min(poisson, LARGEST_POISSON), factor * MODULUS
+        self.k0 = self.poisson / (1 - self.poisson) if k0 is None else k0
         association = _core.associated_fraction(law)
-        if np.isfinite(association):  # elements and particles average forces by it, of this law as of that of the soil
+        if np.isfinite(association):  # elements and particles average forces by it
             self.friction, self.dilation = 45.0, math.degrees(math.atan(association))
             self.strength_parameters = {"friction": "friction angle", "dilation": "dilation angle"}
 
@@ -67,12 +71,12 @@ class GroundAtRest:
         """Stiffness (S, S) [Pa]; size: 4 in two dimensions, 6 in three."""
         vertical = 1 if size == 4 else 2
         horizontal = [axis for axis in range(3) if axis != vertical]
-        nu, weight, matrix = self.poisson, np.zeros(size), self.shear * np.eye(size)
-        weight[vertical], weight[horizontal] = 1.0, nu / (1 - nu) if self.k0 is None else self.k0
-        wave = 2 * self.shear * (1 - nu) / (1 - 2 * nu)
-        matrix[:3, :3] = 0.0
-        matrix[np.ix_(horizontal, horizontal)] = 2 * self.shear / (1 - nu) * np.array([[1, nu], [nu, 1]])
-        return matrix + wave * np.outer(weight, weight)
+        nu, weight = self.poisson, np.zeros(size)
+        shear = self.modulus * (1 - 2 * nu) / (2 * (1 - nu))
+        weight[vertical], weight[horizontal] = 1.0, self.k0
+        matrix = shear * np.diag((np.arange(size) > 2).astype(float))
+        matrix[np.ix_(horizontal, horizontal)] = 2 * shear / (1 - nu) * np.array([[1, nu], [nu, 1]])
+        return matrix + self.modulus * np.outer(weight, weight)
 
     def update(
         self,
@@ -86,6 +90,13 @@ class GroundAtRest:
         stress += strain_increment @ matrix
         if tangent is not None:
             tangent[:] = matrix
+
+
+def _drained_poisson(law: Law) -> float:
+    """Poisson's ratio of the moduli of a law without its water, 0 or more."""
+    skeleton = list(with_inner_laws(law))[-1]
+    shear, wave = skeleton.shear_modulus, skeleton.p_wave_modulus
+    return max((wave - 2 * shear) / (2 * (wave - shear)), 0.0)
 
 
 def laws_at_rest(
@@ -166,7 +177,7 @@ def warn_beyond_strength(
             f"{where}k0: the stresses are beyond the strength of the soil at {count / total:.1%} of the points that have K0, and are brought back "
             "to it: K0 is below that of active or above that of passive earth pressure there",
             RuntimeWarning,
-            stacklevel=4,
+            stacklevel=3,
         )
 
 

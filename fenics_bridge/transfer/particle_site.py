@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 import mpm_core as mpm
 from fenics_bridge.errors import InputError, agree, real_numbers
+from fenics_bridge.fem.at_rest import warn_beyond_strength
 from fenics_bridge.fem.fem_site import FemSite
 from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport
 from fenics_bridge.fem.supports import Support, not_supports
@@ -115,7 +116,8 @@ class ParticleSite:
             self._fill(tag, state.unit_weight[tag], stage)
         if at_rest:
             placed = {tag: self.rows_of(tag) & (model.particles.id >= first) for tag in at_rest}
-            place_at_rest(model, at_rest, placed, f"stage {stage.name!r}: ")
+            given, admissible = place_at_rest(model, at_rest, placed)
+            warn_beyond_strength(model.comm, f"stage {stage.name!r}: ", given, admissible)
         self._weigh(state)
         apply_supports(model, state.supports)
         self._load(state)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import mpm_core as mpm
 from fenics_bridge.errors import agree
-from fenics_bridge.fem.at_rest import laws_at_rest, warn_beyond_strength
+from fenics_bridge.fem.at_rest import laws_at_rest
 from fenics_bridge.fem.stages import SiteState, Stage, StageError
 from fenics_bridge.types import Law
 
@@ -58,15 +58,17 @@ def _in_order(model: mpm.Model, rows: NDArray[np.bool_]) -> NDArray[np.float64]:
 
 
 def place_at_rest(
-    model: mpm.Model, stress: Mapping[int, NDArray[np.float64]], rows_of: Mapping[int, NDArray[np.bool_]], where: str
-) -> None:
-    """Give the particles that a stage has placed their stresses at rest; warns where these are beyond the strength. Collective.
+    model: mpm.Model, stress: Mapping[int, NDArray[np.float64]], rows_of: Mapping[int, NDArray[np.bool_]]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give the particles that a stage has placed their stresses at rest. Collective.
 
     Args:
         model: the particles.
         stress: stresses by the tag of the soil, from `stress_at_rest`.
         rows_of: whether each particle is one that the stage has placed, by the tag of its soil.
-        where: stage, for the warning.
+
+    Returns:
+        These stresses (n, S) [Pa], and the same, brought back to the strength.
     """
     p = model.particles
     every, chosen = p.stress.copy(), np.zeros(len(p), dtype=bool)
@@ -74,10 +76,10 @@ def place_at_rest(
         rows = np.flatnonzero(rows_of[tag])
         every[rows[np.argsort(p.id[rows])]], chosen[rows] = given, True
     p.set("stress", every)
-    warn_beyond_strength(model.comm, where, every[chosen], admissible(model)[chosen])
+    return every[chosen], _admissible(model)[chosen]
 
 
-def admissible(model: mpm.Model) -> NDArray[np.float64]:
+def _admissible(model: mpm.Model) -> NDArray[np.float64]:
     """Stresses of the particles (n, S) [Pa], brought back to the strength of their laws."""
     p = model.particles
     stress, material = p.stress.copy(), p.material

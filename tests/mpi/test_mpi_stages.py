@@ -90,3 +90,28 @@ def test_particles_in_stages_are_the_same_on_all_numbers_of_ranks(folder):
     assert together.keys() == alone.keys()
     largest = max(np.abs(row).max() for row in alone.values())
     assert all(np.abs(together[i] - alone[i]).max() < 1e-8 * largest for i in alone)
+
+
+K0 = dict(zip(SOILS["pit"], (1.2, 0.5, 4.0)))
+
+
+def test_stresses_by_k0_are_the_same_on_all_numbers_of_ranks(folder):
+    """Of finite elements with water, where K0 of a part is beyond the strength, and of particles."""
+    apart = folder / f"rank {COMM.rank}"
+    apart.mkdir()
+    stage = bridge.Stage("in situ", fill=SOILS["pit"], unit_weight=weights(SOILS["pit"]), k0=K0,
+                         pore_pressure=bridge.hydrostatic(2.0))  # fmt: skip
+    values, laws = [], plastic(SOILS["pit"])
+    for place, comm in ((folder, COMM), (apart, MPI.COMM_SELF)):
+        mesh = mesh_of("pit", place, comm)
+        fem = site_of(mesh, laws, degree=2)
+        fem.carry_out(stage)
+        model = mpm.Model(bridge.background_mesh(*mesh), list(laws.values()))
+        numbers = {soil: number for number, soil in enumerate(laws)}
+        particles = bridge.ParticleSite(model, numbers, ROLLERS, tolerance=1e-8, small_displacements=True)
+        particles.carry_out(stage)
+        p = model.particles
+        rows = [pair for ids, stress in comm.allgather((p.id, p.stress)) for pair in zip(ids.tolist(), stress)]
+        values.append((fem.fem.evaluate_at(POINTS)["stress"], np.array([row for _, row in sorted(rows, key=lambda r: r[0])])))
+    for together, alone in zip(*values):
+        assert np.abs(together - alone).max() < 1e-8 * np.abs(alone).max()
