@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -117,7 +117,7 @@ def laws_at_rest(
 def stress_at_rest(
     fem: QuasiStatic,
     state: SiteState,
-    off: Collection[int],
+    off: Sequence[int],
     laws: Mapping[int, Law],
     k0: Mapping[int, float],
     before: Collection[int],

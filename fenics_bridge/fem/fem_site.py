@@ -93,7 +93,9 @@ class FemSite:
         fem = self.fem
         state, _, _ = self.state.after(stage)
         k0 = state.k0_of(stage)
-        given = stress_at_rest(fem, state, self._off(state.there), self._laws(state), k0, self.state.there) if k0 else None
+        given = (
+            stress_at_rest(fem, state, self._off(state.there), self._laws(state), k0, self.state.there) if k0 else None
+        )
         if stage.reset_displacement:
             fem.reset_displacement()
         if replaced := set(stage.remove).intersection(stage.install):

@@ -246,7 +246,10 @@ class SiteState:
         new.law = self.law | self._by_soil(where + "law", stage.law)
         new.unit_weight = self.unit_weight | self._by_soil(where + "unit_weight", stage.unit_weight)
         not_placed = next((key for key in stage.k0 if set(self._cells_of(key, where + "k0")).difference(fill)), None)
-        agree(self._comm, None if not_placed is None else f"{where}k0 is given for {not_placed!r}, expected a soil of fill")
+        agree(
+            self._comm,
+            None if not_placed is None else f"{where}k0 is given for {not_placed!r}, expected a soil of fill",
+        )
         without = [tag for tag in new.there if tag not in new.unit_weight]
         agree(self._comm, f"{where}unit_weight: the soil {self._name_of(without[0])} has none" if without else None)
         pressure = {n: p for key, p in stage.pressure.items() for n in self._facets_of(key, where + "pressure")}

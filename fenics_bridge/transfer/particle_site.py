@@ -106,7 +106,11 @@ class ParticleSite:
         self._refuse_resting(state, stage)
         self._refuse_occupied(fill, stage)
         k0, laws = state.k0_of(stage), {tag: model.laws[material[tag]] for tag in state.there}
-        at_rest = stress_at_rest(self, state, laws, k0, gravity=self._g, per_cell=self._per_cell, **self._options) if k0 else {}
+        at_rest = (
+            stress_at_rest(self, state, laws, k0, gravity=self._g, per_cell=self._per_cell, **self._options)
+            if k0
+            else {}
+        )
         if stage.reset_displacement:
             model.particles.set("initial_position", model.particles.position)
         model.remove(np.isin(model.mesh.cell_tags[model.particles.cell], excavate))

@@ -38,10 +38,12 @@ def stress_at_rest(
     """
     comm, resting = site.model.comm, laws_at_rest(laws, k0, site.state.there)
     model = mpm.Model(site.model.mesh, list(resting.values()), geometry=site.model.geometry)
-    numbers = {tag: number for number, tag in enumerate(resting)}
+    numbers: dict[int | str, int] = {tag: number for number, tag in enumerate(resting)}
     twin = type(site)(model, numbers, state.supports, **{**options, "small_displacements": True})
-    weights = {tag: state.unit_weight[tag] for tag in state.there}
-    stage = Stage("at rest", state.there, unit_weight=weights, pressure=state.pressure, pore_pressure=state.pore_pressure)
+    weights: dict[int | str, float] = {tag: state.unit_weight[tag] for tag in state.there}
+    stage = Stage(
+        "at rest", state.there, unit_weight=weights, pressure=state.pressure, pore_pressure=state.pore_pressure
+    )
     problem = None
     try:
         twin.carry_out(stage)

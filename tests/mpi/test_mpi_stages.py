@@ -112,6 +112,8 @@ def test_stresses_by_k0_are_the_same_on_all_numbers_of_ranks(folder):
         particles.carry_out(stage)
         p = model.particles
         rows = [pair for ids, stress in comm.allgather((p.id, p.stress)) for pair in zip(ids.tolist(), stress)]
-        values.append((fem.fem.evaluate_at(POINTS)["stress"], np.array([row for _, row in sorted(rows, key=lambda r: r[0])])))
+        values.append(
+            (fem.fem.evaluate_at(POINTS)["stress"], np.array([row for _, row in sorted(rows, key=lambda r: r[0])]))
+        )
     for together, alone in zip(*values):
         assert np.abs(together - alone).max() < 1e-8 * np.abs(alone).max()

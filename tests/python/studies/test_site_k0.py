@@ -69,7 +69,9 @@ middle = [2.0, 3.0]
 [boundaries.ground]
 reservoir = 3.0
 """
-HOLDS_WATER = {f"[soils.{soil}]": f"[soils.{soil}]\nconductivity = 1e-8\nporosity = 0.4" for soil in ("clay", "sand", "fill")}
+HOLDS_WATER = {
+    f"[soils.{soil}]": f"[soils.{soil}]\nconductivity = 1e-8\nporosity = 0.4" for soil in ("clay", "sand", "fill")
+}
 
 
 def site_in(folder, text):
@@ -160,7 +162,9 @@ def test_consolidation_begins_with_it(tmp_path):
 
 def test_studies_whose_stresses_begin_at_zero_say_that_they_leave_it_out(tmp_path):
     path = site_in(tmp_path, wet(SITE).replace('material = "elastic"\n', "cohesion = 9e3\n").replace("= 3.0", "= 4.0"))
-    with pytest.warns(RuntimeWarning, match="site.toml: k0 of 'clay', 'sand' is left out, since stresses begin at zero here"):
+    with pytest.warns(
+        RuntimeWarning, match="site.toml: k0 of 'clay', 'sand' is left out, since stresses begin at zero here"
+    ):
         read_slope_site(path, MPI.COMM_WORLD)
     with pytest.warns(RuntimeWarning, match="site.toml: k0 of 'clay', 'sand' is left out"):
         study_main.main("collapse", ["--site", path, "--meshes", 1, "--output", tmp_path / "out"])
@@ -168,11 +172,13 @@ def test_studies_whose_stresses_begin_at_zero_say_that_they_leave_it_out(tmp_pat
 
 def test_k0_beyond_the_strength_is_said_with_its_stage(tmp_path):
     site = read_site(site_in(tmp_path, SITE.replace("k0 = 0.5", "k0 = 6.0") + STAGES), MPI.COMM_WORLD)
-    with pytest.warns(RuntimeWarning, match=r"stage 'in situ': k0: the stresses are beyond the strength of the soil at \d"):
+    with pytest.warns(
+        RuntimeWarning, match=r"stage 'in situ': k0: the stresses are beyond the strength of the soil at \d"
+    ):
         carry_out(site, 2, tmp_path, MPI.COMM_WORLD)
 
 
-def test_the_factor_of_safety_begins_from_it(tmp_path, monkeypatch):
+def test_the_factor_of_safety_begins_from_it(tmp_path):
     """Its stages are carried out, where they are placed at once without K0."""
     import safety
 
