@@ -244,6 +244,19 @@ def test_ground_at_rest_that_does_not_drain_has_its_effective_stress(column):
     assert np.allclose(site.fem.points.stress[:, 0], k0 * vertical, rtol=0, atol=1e-8 * 150e3)
 
 
+def test_a_wall_that_holds_water_back_comes_without_forces(pit, recwarn):
+    """The soil on both sides bears the difference of the water, which moves it without K0."""
+    wall = mpm.beam([(3.0, 6.0), (3.0, 3.0)], axial_stiffness=1e9, bending_stiffness=1e7, impervious=True)
+    stage = {"fill": PIT, "unit_weight": dict.fromkeys(PIT, 20e3), "install": {"wall": wall},
+             "pore_pressure": lambda x: 9810 * np.maximum(np.where(x[:, 0] < 3, 4.0, 5.5) - x[:, 1], 0)}  # fmt: skip
+    site, without = (site_of(pit, dict.fromkeys(PIT, elastic(PIT)["ground"])) for _ in range(2))
+    [report] = carried_out(site, bridge.Stage("in situ", **stage, k0=dict.fromkeys(PIT, 0.9)))
+    [moved] = carried_out(without, bridge.Stage("in situ", **stage))
+    moments = [np.abs(one.fem.member_forces("wall").moment).max() for one in (site, without)]
+    assert moments[0] < 1e-6 * moments[1] and report.largest_displacement < 1e-6 * moved.largest_displacement
+    assert not [one for one in recwarn if "stiff" in str(one.message)]
+
+
 def particle_site(mesh, laws, **options):
     model = mpm.Model(bridge.background_mesh(*mesh), list(laws.values()), geometry=options.pop("geometry", None))
     return bridge.ParticleSite(model, {soil: k for k, soil in enumerate(laws)}, ROLLERS, **options)
