@@ -12,15 +12,14 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from study_main import STUDIES, ended, main
 
 from studies.common.history import History
 
-STUDIES = Path(__file__).parents[3] / "studies"
 # Python's own copy, without what MPI adds to it in this process.
 ENVIRONMENT = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 SMALL = [
@@ -41,9 +40,10 @@ SMALL = [
 
 
 def slope(folder, *options, ranks=1):
-    command = [sys.executable, str(STUDIES / "slope.py"), "--output", str(folder), *SMALL, *options]
-    if ranks > 1:
-        command = ["mpirun", "-n", str(ranks), "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", *command]
+    if ranks == 1:
+        return ended("slope", folder, *SMALL, *options)
+    command = ["mpirun", "-n", str(ranks), "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", sys.executable]
+    command += [str(STUDIES / "slope.py"), "--output", str(folder), *SMALL, *options]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, env=ENVIRONMENT)
 
 
@@ -227,16 +227,7 @@ def checkpointed(tmp_path_factory):
 )
 def test_an_option_that_the_particles_would_not_follow_is_refused(tmp_path, checkpointed, option):
     # Without SMALL: what is not named is that of the checkpoint.
-    command = [
-        sys.executable,
-        STUDIES / "slope.py",
-        "--restart",
-        checkpointed / "checkpoint.h5",
-        *option,
-        "--output",
-        tmp_path,
-    ]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    result = ended("slope", tmp_path, "--restart", checkpointed / "checkpoint.h5", *option)
     assert (
         result.returncode == 2 and f"{option[0]} is " in result.stderr and "but the run of checkpoint" in result.stderr
     )
@@ -246,17 +237,8 @@ def test_an_option_that_the_particles_would_not_follow_is_refused(tmp_path, chec
 def test_a_restart_keeps_options_and_notes_what_changes(tmp_path, checkpointed):
     folder = tmp_path / "run"
     shutil.copytree(checkpointed, folder)
-    command = [
-        sys.executable,
-        STUDIES / "slope.py",
-        "--restart",
-        folder / "checkpoint.h5",
-        "--damping",
-        "0.5",
-        "--checkpoint-every",
-        "20",
-    ]
-    assert subprocess.run(command, capture_output=True, timeout=60).returncode == 0
+    restart = ["--restart", folder / "checkpoint.h5"]
+    assert main("slope", [*restart, "--damping", "0.5", "--checkpoint-every", "20"]) == 0
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["parameters"]["unit_weight"] == 60e3 and summary["parameters"]["damping"] == 0.5
     (row,) = summary["restarts"]
@@ -265,14 +247,13 @@ def test_a_restart_keeps_options_and_notes_what_changes(tmp_path, checkpointed):
     assert "changed then: damping 0 to 0.5" in (folder / "parameters.toml").read_text()
     # The run that it went on from is still told of, and so is the change in the next checkpoint.
     assert json.loads((folder / "summary-1.json").read_text())["parameters"]["damping"] == 0
-    assert subprocess.run(command[:4], capture_output=True, timeout=60).returncode == 0
+    assert main("slope", restart) == 0
     again = json.loads((folder / "summary.json").read_text())
     assert again["parameters"]["damping"] == 0.5 and [r["changed"] for r in again["restarts"]] == [row["changed"], ""]
 
 
 def test_a_restart_in_another_folder_has_the_history_of_the_whole_run(tmp_path, checkpointed):
-    command = [sys.executable, STUDIES / "slope.py", "--restart", checkpointed / "checkpoint.h5", "--output", tmp_path]
-    assert subprocess.run(command, capture_output=True, timeout=60).returncode == 0
+    assert ended("slope", tmp_path, "--restart", checkpointed / "checkpoint.h5").returncode == 0
     begin = json.loads((tmp_path / "summary.json").read_text())["restarts"][0]["time_s"]
     before, whole = (
         np.genfromtxt(folder / "history.csv", delimiter=",", names=True) for folder in (checkpointed, tmp_path)
