@@ -25,6 +25,7 @@ def test_slope_converges_from_above_to_limit_analysis(tmp_path):
         assert (tmp_path / f"{name}.png").stat().st_size > 10_000
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize("angle", [30, 60, 85, 90])
 def test_slopes_of_any_angle(tmp_path, angle):
     """Height 2 m, cohesion 3 kPa: coarse linear triangles come from above too."""
@@ -45,6 +46,7 @@ def test_factor_of_safety(tmp_path):
     assert (tmp_path / "factor_displacement.png").exists() and (tmp_path / "mechanism.png").exists()
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_an_earthquake_as_a_force_that_stays(tmp_path):
     """From above, coarse cells to 8 %. With the critical coefficient as the coefficient the factor is 1."""
     slope = ["--cohesion", "2500", "--crest", "2", "--cell-size", "0.2", "--meshes", "1", "--no-without-dilation"]
@@ -58,12 +60,14 @@ def test_an_earthquake_as_a_force_that_stays(tmp_path):
     assert again["factor_of_safety"] == pytest.approx(1.0, abs=5e-3)
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_slope_that_fails_without_inertia_keeps_its_factor(tmp_path):
     weak = ["--cohesion", "700", "--cell-size", "0.2", "--meshes", "1", "--no-without-dilation", "--critical-seismic"]
     summary = summary_of("safety", tmp_path, *weak)
     assert summary["factor_of_safety"] < 1 and summary["critical_seismic_coefficient"] is None
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_critical_coefficient_of_a_mesh_that_is_too_short_says_so(tmp_path):
     """The deep slip lines of clay begin far behind the crest; a short mesh fails at a larger coefficient than limit analysis."""
     clay = ["--friction-angle", "0", "--cohesion", "6e3", "--depth", "1", "--cell-size", "0.25", "--meshes", "1"]

@@ -193,6 +193,7 @@ def test_a_bank_of_resting_cells_fails_back_as_one_of_particles(tmp_path):
     assert coupled["work_of_stresses_J_per_m"] == pytest.approx(particles["work_of_stresses_J_per_m"], rel=0.03)
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize(
     "options, words",
     [

@@ -195,6 +195,7 @@ def test_studies_of_drawdown_and_rain_say_that_they_leave_members_out(tmp_path):
         read(tmp_path / "dike.toml", MPI.COMM_WORLD, 3.0)
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_the_lining_of_a_shaft_has_hoop_forces(tmp_path):
     """An axisymmetric pit between a stiff cylinder, which the ground presses with about K0 times its weight: N = p r."""
     start, end = SITE.index('[members."upper strut"]'), SITE.index("[[stages]]")
