@@ -12,6 +12,7 @@ def study(name, folder, *options):
     return result, json.loads(summary.read_text()) if summary.exists() else None
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize("solver", ["newton", "relaxation"])
 def test_implicit_slope_takes_twenty_critical_steps_at_once(tmp_path, solver):
     result, summary = study("slope", tmp_path, "--scheme", "implicit", "--solver", solver, "--particles-per-cell", "3",
@@ -23,6 +24,7 @@ def test_implicit_slope_takes_twenty_critical_steps_at_once(tmp_path, solver):
     assert 0.05 < summary["crest_displacement_m"] < 0.6
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_quasi_static_slope_carries_what_it_can(tmp_path):
     carried, summary = study("slope", tmp_path / "a", "--scheme", "quasi-static", "--unit-weight", "15e3", "--time", "1",
                              "--dt", "0.25", "--frames", "4")  # fmt: skip

@@ -111,6 +111,7 @@ def test_without_friction_more_weight_is_as_less_strength(tmp_path):
     assert high - low <= 4e-3 * low
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_site_is_shaken_along_the_first_axis(tmp_path):
     """Its right side is free, so that forces to the right weaken it, which fails at some coefficient, and forces to the left do not."""
     path, factors = site_in(tmp_path), {}
