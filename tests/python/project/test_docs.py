@@ -34,17 +34,7 @@ def name(page):
 def results(tmp_path_factory):
     """The folder results/ with a short run of the study slope in it, for pages that read from there."""
     folder = tmp_path_factory.mktemp("results")
-    command = [
-        sys.executable,
-        ROOT / "studies/slope.py",
-        "--time",
-        "0.1",
-        "--frames",
-        "2",
-        "--output",
-        folder / "slope",
-    ]
-    subprocess.run(command, capture_output=True, check=True, timeout=120)
+    assert main("slope", ["--time", "0.1", "--frames", "2", "--output", folder / "slope"]) == 0
     return folder
 
 

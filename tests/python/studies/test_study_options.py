@@ -131,10 +131,6 @@ def test_numbers_of_particles_are_those_that_fill_a_triangle_or_a_tetrahedron():
 def test_studies_with_nearly_the_right_name_are_named():
     refused = subprocess.run([str(STUDIES / "run"), "slpoe"], capture_output=True, text=True)
     assert refused.returncode == 2 and "there is no study 'slpoe'; did you mean slope? there are:\n" in refused.stderr
-    cases = subprocess.run(
-        [sys.executable, str(STUDIES / "verification"), "--cases", "colum"], capture_output=True, text=True
-    )
-    assert cases.returncode == 2 and "did you mean column?" in cases.stderr
 
 
 def test_both_lists_of_studies_are_alike():

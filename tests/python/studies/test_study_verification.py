@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from study_main import ended
 
 ROOT = Path(__file__).parents[3]
 FOLDER = ROOT / "studies" / "verification"
@@ -145,9 +146,8 @@ def test_methods_stand_side_by_side():
 
 
 def test_wrong_case_is_named(tmp_path):
-    command = [sys.executable, str(FOLDER / "__main__.py"), "--cases", "colum", "--output", str(tmp_path)]
-    ran = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    assert ran.returncode == 2 and "'colum'" in ran.stderr and "column" in ran.stderr
+    ran = ended("verification", tmp_path, "--cases", "colum")
+    assert ran.returncode == 2 and "--cases names 'colum'" in ran.stderr and "did you mean column?" in ran.stderr
 
 
 def test_blocks_on_a_plane_are_one_wedge():
