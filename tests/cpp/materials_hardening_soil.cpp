@@ -37,6 +37,8 @@ Start random_start(std::mt19937& random, double size)
     component *= soil.slope * mobilised * smallest / (direction.difference * unit);
   return {pressure,
           smallest,
+          softness_of(soil, smallest),
+          mobilised,
           4e-3 * uniform(random),
           100e3 * uniform(random) + 10e3,
           size * normal(random),
@@ -53,7 +55,7 @@ TEST(HardeningSoil, NewtonFindsWhatBracketsFind)
     for (int point = 0; point < 1000; ++point)
     {
       const Start start = random_start(random, size);
-      const auto found = newton(soil, start, false);
+      const auto found = newton(soil, start, elastic_end(soil, start, 0), false);
       const auto expected = bracketed(soil, start);
       ASSERT_TRUE(expected);
       if (!found)
@@ -65,7 +67,7 @@ TEST(HardeningSoil, NewtonFindsWhatBracketsFind)
       loose += expected->is_loose;
       EXPECT_EQ(found->is_loose, expected->is_loose);
       EXPECT_NEAR(found->at.log_stress, expected->at.log_stress, 1e-6);
-      const auto one = end_of<double>(soil, start, found->at), other = end_of<double>(soil, start, expected->at);
+      const auto &one = found->end, &other = expected->end;
       EXPECT_NEAR(one.q, other.q, 1e-6 * (1e3 + other.q));
       EXPECT_NEAR(one.plastic, other.plastic, 1e-9 + 1e-6 * other.plastic);
       EXPECT_LT(std::abs(one.deviatoric), 1e-11);

@@ -16,10 +16,10 @@ constexpr double most_stress = 1e15; ///< [Pa], of values that can be worked wit
 /// Stress and strain of first loading in the oedometer at the reference pressure, by the vertical stress
 struct Oedometer
 {
-  double mobilised;              ///< (s1 - s3) / q_f
-  double volumetric, deviatoric; ///< strains per Pa without those of the cap
-  double pressure, q, cap;       ///< p + a, q and their slopes
-  double pressure_slope, q_slope;
+  double mobilised;               ///< (s1 - s3) / q_f
+  double volumetric, deviatoric;  ///< strains per Pa without those of the cap
+  double pressure, q;             ///< p + a and q
+  double pressure_slope, q_slope; ///< by the vertical stress
 };
 
 double normal_k0(const HardeningSoil& law)
@@ -34,7 +34,9 @@ Oedometer oedometer_of(const HardeningSoil& law, const Soil& soil)
   const Dual<1> vertical = variable<1>(law.reference_pressure, 0), smallest = k0 * vertical + soil.attraction;
   const Dual<1> q = vertical - k0 * vertical, mobilised = q / (soil.slope * smallest);
   const double young = soil.unloading * std::pow(least / soil.reference, soil.exponent);
-  const double sheared = std::max(shear_of(soil, smallest, mobilised).slopes[0], 0.0);
+  const Dual<1> softness = chained(smallest, softness_of(soil, smallest.value),
+                                   -soil.exponent * softness_of(soil, smallest.value) / smallest.value);
+  const double sheared = std::max(shear_of(soil, smallest, softness, mobilised).slopes[0], 0.0);
   const double dilation = dilatancy(soil, mobilised.value), pressure_slope = (1 + 2 * k0) / 3;
   const double elastic = pressure_slope / (soil.bulk_per_young() * young);
   return {mobilised.value,
@@ -42,7 +44,6 @@ Oedometer oedometer_of(const HardeningSoil& law, const Soil& soil)
           q.slopes[0] / (3 * soil.shear_per_young() * young) + 0.5 * (1 - dilation / 3) * sheared,
           pressure_slope * law.reference_pressure + soil.attraction,
           q.value,
-          0,
           pressure_slope,
           q.slopes[0]};
 }
@@ -59,12 +60,20 @@ void set_cap(Soil& soil, const HardeningSoil& law, const Oedometer& test)
   soil.cap_modulus = cap_change / volumetric * std::pow(cap / soil.reference, -soil.exponent);
 }
 
+/// gamma of a stress on the hyperbola, at most that of failure
+/// @param stress      s3 + a
+/// @param difference  s1 - s3
+double hyperbola(const Soil& soil, double stress, double difference)
+{
+  return shear_of(soil, stress, softness_of(soil, stress), std::min(difference / (soil.slope * stress), 1.0));
+}
+
 /// Sets gamma and p_p of ground that has carried a vertical stress.
 void set_start(Soil& soil, const HardeningSoil& law, double vertical)
 {
   const double k0 = normal_k0(law), stress = std::max(k0 * vertical + soil.attraction, least_stress * soil.reference);
   const double q = (1 - k0) * vertical, pressure = std::max((1 + 2 * k0) / 3 * vertical + soil.attraction, stress);
-  soil.shear = std::max(shear_of(soil, stress, std::min(q / (soil.slope * stress), 1.0)), 0.0);
+  soil.shear = hyperbola(soil, stress, q);
   soil.cap = cap_through(soil, pressure, q, direction_of(soil, 1.0).cap);
 }
 
@@ -136,8 +145,7 @@ std::pair<double, double> hardening_of(const Soil& soil, const PointBatch<D>& po
   const double plastic = points.state[0][i], shear = points.state[1][i], growth = points.state[2][i];
   if (plastic != 0 || shear != 0 || growth != 0)
     return {soil.shear + shear, soil.cap * std::exp(growth)};
-  const double mobilised = std::min(direction.difference * q / (soil.slope * stress), 1.0);
-  return {std::max(soil.shear, shear_of(soil, stress, mobilised)),
+  return {std::max(soil.shear, hyperbola(soil, stress, direction.difference * q)),
           std::max(soil.cap, cap_through(soil, pressure, q, direction.cap))};
 }
 
@@ -152,6 +160,8 @@ Start start_of(const Soil& soil, const PointBatch<D>& points, Index i, Tensors<D
   const auto [shear, cap] = hardening_of<D>(soil, points, i, pressure, smallest, q, direction);
   return {pressure,
           smallest,
+          softness_of(soil, smallest),
+          std::min(direction.difference * q / (soil.slope * smallest), 1.0),
           shear,
           cap,
           -3 * mean<D>(strain),
@@ -203,7 +213,7 @@ Outcome update_point(const Soil& soil, const PointBatch<D>& points, Index i, dou
   const std::optional<Solution> solution = is_sound(start) ? solution_of(soil, start) : std::nullopt;
   if (!solution)
     return Outcome::failed;
-  const End<double> end = end_of<double>(soil, start, solution->at);
+  const End<double>& end = solution->end;
   if (!(end.pressure + end.trial_q < most_stress))
     return Outcome::failed;
   const double ratio = end.trial_q > 0 ? end.q / end.trial_q : 0;
@@ -274,8 +284,7 @@ std::array<double, 2> hardened_to(const HardeningSoil& law, const SymTensor<D>& 
   Soil before = soil;
   if (overconsolidation > 1)
     set_start(before, law, std::max(overconsolidation * largest, 0.0));
-  const double mobilised = std::min(direction.difference * q / (soil.slope * above), 1.0);
-  const double shear = std::max({before.shear, soil.shear, shear_of(soil, above, mobilised)});
+  const double shear = std::max({before.shear, soil.shear, hyperbola(soil, above, direction.difference * q)});
   const double cap = std::max({before.cap, soil.cap, cap_through(soil, pressure, q, direction.cap)});
   return {shear - soil.shear, std::log(cap / soil.cap)};
 }

@@ -53,44 +53,43 @@ struct Direction
 template <class T>
 Direction<T> direction_of(const Soil& soil, const T& cosine)
 {
-  constexpr double third = 2 * std::numbers::pi / 3;
   const double reduced = (1 - rounding) * value_of(cosine), angle = std::acos(reduced) / 3;
-  const T theta = chained(cosine, angle, -(1 - rounding) / (3 * std::sqrt(1 - reduced * reduced)));
-  // s1, s2 and s3 less p, over q
-  std::array<T, 3> part;
-  for (std::size_t k = 0; k < 3; ++k)
-  {
-    constexpr std::array shift{0.0, -third, third};
-    const double at = angle + shift[k];
-    part[k] = chained(theta, 2.0 / 3 * std::cos(at), -2.0 / 3 * std::sin(at));
-  }
-  return {part[0] - part[2], -part[2], part[0] + (soil.extension - 1) * part[1] - soil.extension * part[2]};
+  const double by_cosine = -(1 - rounding) / (3 * std::sqrt(1 - reduced * reduced));
+  const double c = std::cos(angle) / 3, s = std::sin(angle) / std::numbers::sqrt3;
+  // s1, s2 and s3 less p, over q: 2/3 of the cosines of the angle, less and plus 120 degrees
+  const T largest = chained(cosine, 2 * c, -2 * std::numbers::inv_sqrt3 * s * by_cosine);
+  const T middle = chained(cosine, s - c, (c * std::numbers::sqrt3 + s * std::numbers::inv_sqrt3) * by_cosine);
+  const T smallest = -(largest + middle);
+  return {largest - smallest, -smallest, largest + (soil.extension - 1) * middle - soil.extension * smallest};
 }
 
-/// t^power of s3 + a
+/// exp(y) and (exp(y) - 1) / y, for a small y without a call of the library
 template <class T>
-T power_of(const Soil& soil, const T& stress, double power)
+struct Exponential
 {
-  return exponential(power * logarithm(stress / soil.reference));
-}
+  T factor, mean;
+};
 
-/// (exp(y) - 1) / y
 template <class T>
-T mean_growth(const T& y)
+Exponential<T> exponential_of(const T& y)
 {
   const Growth<double> growth = growth_of(value_of(y));
-  return chained(y, growth.mean, growth.slope);
+  return {chained(y, growth.factor, growth.factor), chained(y, growth.mean, growth.slope)};
 }
 
 /// gamma of a stress on the hyperbola
 /// @param stress     s3 + a
+/// @param softness   t^-m of it
 /// @param mobilised  (s1 - s3) / q_f
 template <class T>
-T shear_of(const Soil& soil, const T& stress, const T& mobilised)
+T shear_of(const Soil& soil, const T& stress, const T& softness, const T& mobilised)
 {
   const T loading = (2 - soil.failure_ratio) / soil.secant * mobilised / (1 - soil.failure_ratio * mobilised);
-  return soil.slope * stress * power_of(soil, stress, -soil.exponent) * (loading - 2 / soil.unloading * mobilised);
+  return soil.slope * stress * softness * (loading - 2 / soil.unloading * mobilised);
 }
+
+/// t^-m of s3 + a
+inline double softness_of(const Soil& soil, double stress) { return std::pow(stress / soil.reference, -soil.exponent); }
 
 /// sin(psi_m)
 template <class T>
@@ -114,14 +113,15 @@ T cap_strain(const Soil& soil, double cap, const T& growth)
 {
   const double power = 1 - soil.exponent;
   const double per_growth = soil.reference / soil.cap_modulus * std::pow(cap / soil.reference, power);
-  return per_growth * growth * mean_growth(power * growth);
+  return per_growth * growth * exponential_of<T>(power * growth).mean;
 }
 
 /// A point at the start of an increment, and the increment
 struct Start
 {
   double pressure;              ///< p + a
-  double stress;                ///< s3 + a, at least the least one
+  double stress, softness;      ///< s3 + a, at least the least one, and t^-m of it
+  double mobilised;             ///< (s1 - s3) / q_f, at most 1
   double shear, cap;            ///< gamma and p_p
   double volumetric;            ///< volumetric strain increment
   std::array<double, 3> square; ///< q^2 of the trial by 2 G
@@ -154,9 +154,10 @@ struct End
 template <class T>
 End<T> end_of(const Soil& soil, const Start& start, const Unknowns<T>& x, const Changes<T>& changes = {})
 {
-  const T stress = start.stress * exponential(x.log_stress);
-  const T young = soil.unloading * std::pow(start.stress / soil.reference, soil.exponent) * mean_growth(x.log_stress) /
-                  mean_growth((1 - soil.exponent) * x.log_stress);
+  const Exponential<T> growth = exponential_of(x.log_stress);
+  const Exponential<T> of_strain = exponential_of<T>((1 - soil.exponent) * x.log_stress); // the integral of 1 / E_ur
+  const T stress = start.stress * growth.factor, softness = start.softness * of_strain.factor / growth.factor;
+  const T young = soil.unloading / start.softness * growth.mean / of_strain.mean;
   const T shear_modulus = soil.shear_per_young() * young;
 
   const double double_shear = 2 * value_of(shear_modulus);
@@ -173,12 +174,13 @@ End<T> end_of(const Soil& soil, const Start& start, const Unknowns<T>& x, const 
   const T q = soil.slope * mobilised * stress / direction.difference;
   const T pressure = stress + direction.smallest * q;
 
-  const T hardening = positive_part(shear_of(soil, stress, mobilised) - start.shear);
+  const T hardening = positive_part(shear_of(soil, stress, softness, mobilised) - start.shear);
   const T failing = failure_strain * positive_part(x.mobilised - 1);
   const T sheared = hardening + failing;
   const T dilation = dilatancy(soil, mobilised);
 
-  const T cap_growth = positive_part(logarithm(cap_through(soil, pressure, q, direction.cap) / start.cap));
+  const T cap = cap_through(soil, pressure, q, direction.cap) / start.cap;
+  const T cap_growth = value_of(cap) > 1 ? logarithm(cap) : T{};
   const T compaction = cap_strain(soil, start.cap, cap_growth);
   const T by_cap = soil.cap_slope * direction.cap;
   const T plastic = 0.5 * (1 - dilation / 3) * sheared + compaction * by_cap * by_cap * q / pressure;
@@ -200,30 +202,60 @@ struct Solution
 {
   Unknowns<double> at;
   bool is_loose;
+  End<double> end;
 };
+
+inline Solution solution_at(const Soil& soil, const Start& start, const Unknowns<double>& x, bool is_loose)
+{
+  return {x, is_loose, end_of<double>(soil, start, x)};
+}
 
 inline double least_log_stress(const Soil& soil, const Start& start) { return std::log(soil.least / start.stress); }
 
-/// The first guess is elastic, with the moduli of the start.
-inline Unknowns<double> first_guess(const Soil& soil, const Start& start)
+/// The end without plastic strain, by the moduli of an end before
+inline Unknowns<double> elastic_end(const Soil& soil, const Start& start, double log_stress_before)
 {
-  const double young = soil.unloading * std::pow(start.stress / soil.reference, soil.exponent);
+  const double young = soil.unloading / start.softness * exponential_of(log_stress_before).mean /
+                       exponential_of((1 - soil.exponent) * log_stress_before).mean;
   const double double_shear = 2 * soil.shear_per_young() * young;
   const double q = std::sqrt(std::max(polynomial<double>(start.square, double_shear), 0.0));
   const Direction<double> direction = direction_of(soil, lode_cosine(polynomial<double>(start.cube, double_shear), q));
   const double pressure = start.pressure + soil.bulk_per_young() * young * start.volumetric;
   const double stress = std::max(pressure - direction.smallest * q, 0.1 * start.stress);
-  return {std::max(std::log(stress / start.stress), least_log_stress(soil, start)),
-          std::min(direction.difference * q / (soil.slope * stress), 0.99)};
+  return {std::log(stress / start.stress), direction.difference * q / (soil.slope * stress)};
+}
+
+/// The solution of a small elastic increment, whose moduli hardly change; nothing where it yields or is not small
+inline std::optional<Solution> elastic_solution(const Soil& soil, const Start& start, Unknowns<double> x)
+{
+  const double stress = start.stress * (1 + x.log_stress);
+  if (!(std::abs(x.log_stress) < small_growth && x.mobilised < 1) || x.log_stress < least_log_stress(soil, start) ||
+      shear_of(soil, stress, start.softness, x.mobilised) > start.shear)
+    return {};
+  for (int round = 0; round < 2; ++round)
+    x = elastic_end(soil, start, x.log_stress);
+  const Solution solution = solution_at(soil, start, x, false);
+  const double error = std::abs(solution.end.volumetric) + std::abs(solution.end.deviatoric);
+  const double size = std::abs(start.volumetric) + std::sqrt(start.square[2]);
+  return solution.end.plastic == 0 && error < 1e-7 * size ? std::optional(solution) : std::nullopt;
+}
+
+/// Newton's method begins at the start of a small increment, else at the elastic end.
+inline Unknowns<double> first_guess(const Soil& soil, const Start& start, const Unknowns<double>& elastic)
+{
+  if (std::abs(elastic.log_stress) < small_growth)
+    return {0, std::min(start.mobilised, 0.99)};
+  return {std::max(elastic.log_stress, least_log_stress(soil, start)), std::min(elastic.mobilised, 0.99)};
 }
 
 /// Newton's method; nothing where it does not converge
-inline std::optional<Solution> newton(const Soil& soil, const Start& start, bool is_loose)
+inline std::optional<Solution> newton(const Soil& soil, const Start& start, const Unknowns<double>& elastic,
+                                      bool is_loose)
 {
   constexpr int most = 40;
   constexpr double beside_failure = 1e-6;
   const double lowest = least_log_stress(soil, start);
-  Unknowns<double> x = first_guess(soil, start);
+  Unknowns<double> x = first_guess(soil, start, elastic);
   if (is_loose)
     x.log_stress = lowest;
   for (int iteration = 0; iteration < most; ++iteration)
@@ -240,18 +272,17 @@ inline std::optional<Solution> newton(const Soil& soil, const Start& start, bool
     }
     if (!std::isfinite(change.log_stress + change.mobilised))
       return {};
-    const double step = std::clamp(change.log_stress, -2.0, 2.0);
-    const double stress = std::max(x.log_stress + step, lowest);
+    const double stress = std::max(x.log_stress + std::clamp(change.log_stress, -2.0, 2.0), lowest);
     double mobilised = std::max(x.mobilised + change.mobilised, 0.0);
     if ((x.mobilised > 1) != (mobilised > 1)) // on the other side of failure the slopes are others
       mobilised = mobilised > 1 ? 1 + beside_failure : 1 - beside_failure;
     const double moved = std::abs(stress - x.log_stress) + std::abs(mobilised - x.mobilised);
     x = {stress, mobilised};
-    if (moved < 1e-9 * (1 + std::abs(x.log_stress) + x.mobilised)) // of second order: the next step is round-off
+    if (moved < 1e-7 * (1 + std::abs(x.log_stress) + x.mobilised)) // the error is of the order of its square
     {
       if (!is_loose && x.log_stress == lowest && change.log_stress < 0)
-        return newton(soil, start, true);
-      return Solution{x, is_loose};
+        return newton(soil, start, elastic, true);
+      return solution_at(soil, start, x, is_loose);
     }
   }
   return {};
@@ -280,15 +311,18 @@ inline std::optional<Solution> bracketed(const Soil& soil, const Start& start)
   const double lowest = least_log_stress(soil, start), highest = lowest + 40;
   const Sample low{lowest, excess(lowest)}, high{highest, excess(highest)};
   if (low.f > 0)
-    return Solution{at(lowest), true};
+    return solution_at(soil, start, at(lowest), true);
   if (!(high.f > 0))
     return {};
-  return Solution{at(root_between(excess, low, high)), false};
+  return solution_at(soil, start, at(root_between(excess, low, high)), false);
 }
 
 inline std::optional<Solution> solution_of(const Soil& soil, const Start& start)
 {
-  if (const std::optional<Solution> found = newton(soil, start, false))
+  const Unknowns<double> elastic = elastic_end(soil, start, 0);
+  if (const std::optional<Solution> found = elastic_solution(soil, start, elastic))
+    return found;
+  if (const std::optional<Solution> found = newton(soil, start, elastic, false))
     return found;
   return bracketed(soil, start);
 }

@@ -126,12 +126,6 @@ constexpr T positive_part(const T& x)
 
 /// Elementary functions of a number, or of one with derivatives
 template <class T>
-T exponential(const T& x)
-{
-  const double value = std::exp(value_of(x));
-  return chained(x, value, value);
-}
-template <class T>
 T logarithm(const T& x)
 {
   return chained(x, std::log(value_of(x)), 1 / value_of(x));
