@@ -23,6 +23,8 @@ inline constexpr double rounding = 1e-6;
 inline constexpr double least_stress = 1e-4;
 /// Shear strain of failure by which the unknown of the mobilised strength grows by one beyond failure
 inline constexpr double failure_strain = 1e-2;
+/// Distance from failure, in mobilised strength, at which Newton's method goes on when it comes to the other side
+inline constexpr double beside_failure = 1e-6;
 
 /// The law with the constants of its returns worked out
 struct Soil
@@ -212,48 +214,70 @@ inline Solution solution_at(const Soil& soil, const Start& start, const Unknowns
 
 inline double least_log_stress(const Soil& soil, const Start& start) { return std::log(soil.least / start.stress); }
 
-/// The end without plastic strain, by the moduli of an end before
-inline Unknowns<double> elastic_end(const Soil& soil, const Start& start, double log_stress_before)
+/// The end of an increment without plastic strain
+struct ElasticEnd
 {
-  const double young = soil.unloading / start.softness * exponential_of(log_stress_before).mean /
-                       exponential_of((1 - soil.exponent) * log_stress_before).mean;
-  const double double_shear = 2 * soil.shear_per_young() * young;
-  const double q = std::sqrt(std::max(polynomial<double>(start.square, double_shear), 0.0));
-  const Direction<double> direction = direction_of(soil, lode_cosine(polynomial<double>(start.cube, double_shear), q));
+  Unknowns<double> at;
+  double shear_modulus, pressure, q;
+  double softness; ///< t^-m of the end whose moduli it has
+  double cap;      ///< p_p of the cap through it
+};
+
+/// @param log_stress  of the end whose moduli it has, an estimate of its own
+inline ElasticEnd elastic_end(const Soil& soil, const Start& start, double log_stress)
+{
+  const Exponential<double> growth = exponential_of(log_stress);
+  const Exponential<double> of_strain = exponential_of((1 - soil.exponent) * log_stress);
+  const double young = soil.unloading / start.softness * growth.mean / of_strain.mean;
+  const double shear = soil.shear_per_young() * young;
+  const double q = std::sqrt(std::max(polynomial<double>(start.square, 2 * shear), 0.0));
+  const Direction<double> direction = direction_of(soil, lode_cosine(polynomial<double>(start.cube, 2 * shear), q));
   const double pressure = start.pressure + soil.bulk_per_young() * young * start.volumetric;
   const double stress = std::max(pressure - direction.smallest * q, 0.1 * start.stress);
-  return {std::log(stress / start.stress), direction.difference * q / (soil.slope * stress)};
+  return {{std::log(stress / start.stress), direction.difference * q / (soil.slope * stress)},
+          shear,
+          pressure,
+          q,
+          start.softness * of_strain.factor / growth.factor,
+          cap_through(soil, pressure, q, direction.cap)};
 }
 
 /// The solution of a small elastic increment, whose moduli hardly change; nothing where it yields or is not small
-inline std::optional<Solution> elastic_solution(const Soil& soil, const Start& start, Unknowns<double> x)
+inline std::optional<Solution> elastic_solution(const Soil& soil, const Start& start, ElasticEnd end)
 {
-  const double stress = start.stress * (1 + x.log_stress);
-  if (!(std::abs(x.log_stress) < small_growth && x.mobilised < 1) || x.log_stress < least_log_stress(soil, start) ||
-      shear_of(soil, stress, start.softness, x.mobilised) > start.shear)
-    return {};
-  for (int round = 0; round < 2; ++round)
-    x = elastic_end(soil, start, x.log_stress);
-  const Solution solution = solution_at(soil, start, x, false);
-  const double error = std::abs(solution.end.volumetric) + std::abs(solution.end.deviatoric);
-  const double size = std::abs(start.volumetric) + std::sqrt(start.square[2]);
-  return solution.end.plastic == 0 && error < 1e-7 * size ? std::optional(solution) : std::nullopt;
+  const auto yields = [&]
+  {
+    const double stress = start.stress * (1 + end.at.log_stress), mobilised = end.at.mobilised;
+    return !(mobilised < 1 && shear_of(soil, stress, end.softness, mobilised) <= start.shear && end.cap <= start.cap);
+  };
+  const double lowest = least_log_stress(soil, start);
+  for (int round = 0; round < 4; ++round)
+  {
+    if (!(std::abs(end.at.log_stress) < small_growth && end.at.log_stress > lowest) || yields())
+      return {};
+    const double before = end.at.log_stress;
+    end = elastic_end(soil, start, before);
+    if (std::abs(end.at.log_stress - before) <= 1e-6 * std::abs(before)) // the error is smaller by the growth again
+      return yields() ? std::nullopt
+                      : std::optional(
+                            Solution{end.at, false, {end.shear_modulus, end.pressure, end.q, end.q, 0, 0, 0, 0, 0}});
+  }
+  return {};
 }
 
 /// Newton's method begins at the start of a small increment, else at the elastic end.
-inline Unknowns<double> first_guess(const Soil& soil, const Start& start, const Unknowns<double>& elastic)
+inline Unknowns<double> first_guess(const Soil& soil, const Start& start, const ElasticEnd& elastic)
 {
-  if (std::abs(elastic.log_stress) < small_growth)
-    return {0, std::min(start.mobilised, 0.99)};
-  return {std::max(elastic.log_stress, least_log_stress(soil, start)), std::min(elastic.mobilised, 0.99)};
+  const Unknowns<double>& end = elastic.at;
+  if (std::abs(end.log_stress) < small_growth)
+    return {0, start.mobilised < 1 - beside_failure ? start.mobilised : 1 + beside_failure};
+  return {std::max(end.log_stress, least_log_stress(soil, start)), std::min(end.mobilised, 0.99)};
 }
 
 /// Newton's method; nothing where it does not converge
-inline std::optional<Solution> newton(const Soil& soil, const Start& start, const Unknowns<double>& elastic,
-                                      bool is_loose)
+inline std::optional<Solution> newton(const Soil& soil, const Start& start, const ElasticEnd& elastic, bool is_loose)
 {
   constexpr int most = 40;
-  constexpr double beside_failure = 1e-6;
   const double lowest = least_log_stress(soil, start);
   Unknowns<double> x = first_guess(soil, start, elastic);
   if (is_loose)
@@ -319,7 +343,7 @@ inline std::optional<Solution> bracketed(const Soil& soil, const Start& start)
 
 inline std::optional<Solution> solution_of(const Soil& soil, const Start& start)
 {
-  const Unknowns<double> elastic = elastic_end(soil, start, 0);
+  const ElasticEnd elastic = elastic_end(soil, start, 0);
   if (const std::optional<Solution> found = elastic_solution(soil, start, elastic))
     return found;
   if (const std::optional<Solution> found = newton(soil, start, elastic, false))
