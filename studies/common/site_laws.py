@@ -75,7 +75,10 @@ def law_at(table: dict, height: float | None, where: str) -> Any:
         raise mpm.InputError(f"{error}{place}" if isinstance(error, ParameterError) else f"{where}: {error}") from None
     if values["shear_strength"] is not None:
         values["cohesion"] = values["shear_strength"]
-    return law_of(argparse.Namespace(**values))
+    try:
+        return law_of(argparse.Namespace(**values))
+    except mpm.InputError as error:
+        raise mpm.InputError(f"{where}: {error}{place}") from None
 
 
 def located(table: dict, folder: Path) -> dict:

@@ -229,6 +229,16 @@ Outcome update_point(const Soil& soil, const PointBatch<D>& points, Index i, dou
 }
 } // namespace hardening_soil
 
+namespace
+{
+/// To five digits
+double rounded_down(double number)
+{
+  const double unit = std::pow(10, std::floor(std::log10(number)) - 4);
+  return unit * std::floor(number / unit);
+}
+} // namespace
+
 void check(const HardeningSoil& law)
 {
   using namespace hardening_soil;
@@ -244,7 +254,7 @@ void check(const HardeningSoil& law)
           "so large that the strength carries level ground under the reference pressure");
   const double most = std::min(1 / std::max(test.volumetric, 0.0), 2.0 / 3 / test.deviatoric);
   require(law.oedometer_modulus < most, "oedometer_modulus", law.oedometer_modulus,
-          "below " + number_text(most) +
+          "below " + number_text(rounded_down(most)) +
               " Pa, the modulus that the other parameters give without a cap (a smaller secant_modulus or "
               "unloading_modulus "
               "would be softer)");
