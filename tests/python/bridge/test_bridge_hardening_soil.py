@@ -54,7 +54,9 @@ def test_the_factor_of_safety_is_that_of_mohr_and_coulomb():
 
 
 def test_particles_take_over_stresses_and_hardening():
-    domain, cell_tags, facet_tags = bridge.slope_mesh(MPI.COMM_WORLD, height=4.0, angle=30.0, crest=4.0, cell_size=0.5, kind="fitted")
+    domain, cell_tags, facet_tags = bridge.slope_mesh(
+        MPI.COMM_WORLD, height=4.0, angle=30.0, crest=4.0, cell_size=0.5, kind="fitted"
+    )
     law = sand(cohesion=1e3)
     body, _, sides = bridge.soil_mesh(domain, cell_tags, facet_tags)
     supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
