@@ -21,9 +21,9 @@ namespace mpm::materials
 ///     cap              (w q / alpha)^2 + (p + a)^2 = p_p^2, associated, which hardens by
 ///                      dp_p = H (p_p / (reference pressure + a))^m de_v; w is 1 in triaxial compression and
 ///                      (3 + sin(phi)) / (3 - sin(phi)) in extension
-/// Plastic strains are along the deviator of the stress; in triaxial compression de_a = (dgamma + de_v) / 2, as in the
-/// published law. alpha and H follow from the oedometer modulus and K0 of normally consolidated ground at the reference
-/// pressure.
+/// gamma is the sum of the sizes of the principal plastic strains of shear, in triaxial compression 2 e_a - e_v as in
+/// the published law, and in plane strain e_1 - e_3. Plastic strains are along the deviator of the stress. alpha and H
+/// follow from the oedometer modulus and K0 of normally consolidated ground at the reference pressure.
 ///
 /// An increment is implicit, with the secant of the elastic modulus between the stresses of its start and its end. The
 /// equations depend on the Lode angle of the trial deviator, rounded by 0.03 degrees at the edges of the hexagon.

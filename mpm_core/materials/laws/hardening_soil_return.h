@@ -101,6 +101,19 @@ T dilatancy(const Soil& soil, const T& mobilised)
   return positive_part((sine - soil.critical_sine) / (1 - soil.critical_sine * sine));
 }
 
+/// Deviatoric plastic strain of a shear strain gamma, the sum of the sizes of the principal plastic strains, whose
+/// deviator has the direction of the stress's and which dilate by sin(psi_m) gamma. Two of them are compressed or two
+/// extended; where the middle one is zero, as in plane strain at failure, the change is rounded.
+template <class T>
+T deviatoric_part(const Direction<T>& direction, const T& dilation, const T& sheared)
+{
+  constexpr double width = 0.01;
+  const T one_compressed = 3 * (direction.difference - direction.smallest) / (1 - dilation / 3);
+  const T two_compressed = 3 * direction.smallest / (1 + dilation / 3);
+  const T apart = one_compressed - two_compressed;
+  return 2 * sheared / (one_compressed + two_compressed + square_root(apart * apart + width * width));
+}
+
 /// p_p of the cap through a stress
 template <class T>
 T cap_through(const Soil& soil, const T& pressure, const T& q, const T& cap_direction)
@@ -185,7 +198,7 @@ End<T> end_of(const Soil& soil, const Start& start, const Unknowns<T>& x, const 
   const T cap_growth = value_of(cap) > 1 ? logarithm(cap) : T{};
   const T compaction = cap_strain(soil, start.cap, cap_growth);
   const T by_cap = soil.cap_slope * direction.cap;
-  const T plastic = 0.5 * (1 - dilation / 3) * sheared + compaction * by_cap * by_cap * q / pressure;
+  const T plastic = deviatoric_part(direction, dilation, sheared) + compaction * by_cap * by_cap * q / pressure;
 
   const T elastic = (pressure - start.pressure) / (soil.bulk_per_young() * young);
   return {shear_modulus,

@@ -144,6 +144,23 @@ def test_dilatancy_before_failure_is_rowes():
     assert (-np.diff(plastic_volume) / d_gamma)[rows] == pytest.approx(rowe[rows + 1], abs=2e-3)
 
 
+@pytest.mark.parametrize("angle", [0.0, 8.0, 20.0, 35.0])
+def test_soil_at_failure_dilates_by_its_angle_in_plane_strain_and_extension(angle):
+    # sin(psi) = -de_v / sum of |de_i|, as of the planes of Mohr and Coulomb; plane strain: -de_v / (de_1 - de_3)
+    law, sine = sand(dilation_angle=angle), np.sin(np.radians(angle))
+    for direction, sign in (([-1.0, None, 0, 0, 0, 0], 1), ([1.0, None, None, 0, 0, 0], -1)):
+        test = mpm.ElementTest(law, isotropic(100e3))
+        for _ in range(300):
+            test.step([None if e is None else 1e-3 * e for e in direction])
+        before, plastic = test.strain.copy(), test.state[0]
+        for _ in range(20):
+            test.step([None if e is None else 1e-3 * e for e in direction])
+        strain = (test.strain - before)[:3]  # elastic strains do not change
+        assert strain.sum() / np.abs(strain).sum() == pytest.approx(sine, abs=0.01 * sine + 1e-6)
+        assert test.stress[:3] @ strain > -0.01 * 100e3 * np.abs(strain).sum()  # zero for associated flow without cohesion
+        assert test.state[0] > plastic and sign * strain[0] < 0
+
+
 def test_soil_is_as_stiff_as_in_unloading_up_to_its_preconsolidation():
     before, law = 200e3, sand(vertical_preconsolidation=200e3)
     test = mpm.ElementTest(law, isotropic(50e3))
