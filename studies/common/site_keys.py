@@ -12,7 +12,7 @@ from fenics_bridge import water
 
 from .parameters import unknown_key
 from .site_k0 import KEY as K0
-from .site_laws import STRENGTHS, is_number, law_keys, located
+from .site_laws import give_way, is_number, law_keys, located
 from .site_tables import MOST_FILES, merged, parsed
 
 DAY = 86400.0
@@ -117,10 +117,7 @@ def _extended(path: Path, depth: int = 1) -> dict[str, Any]:
     for key in ("soils", "laws"):
         below[key] = {name: located(law, folder.resolve()) for name, law in below.get(key, {}).items()}
         for name in below[key]:
-            given = table.get(key, {}).get(name, {})
-            for one, other in (STRENGTHS, STRENGTHS[::-1]):
-                if one in given and other not in given:
-                    below[key][name].pop(other, None)
+            give_way(below[key][name], table.get(key, {}).get(name, {}))
     return merged(below, table)
 
 

@@ -16,11 +16,14 @@ import mpm_core as mpm
 from .options import add_number, study_parser
 from .parameters import ParameterError, checked_values
 from .slope_case import add_soil_options
-from .soils import add_law_options, law_of
+from .soils import MATERIALS, ONLY_WITH, add_law_options, law_of
 
 
 STRENGTHS = ("cohesion", "shear_strength")
 """Parameters of which a law has one; in a site that extends another, one of them takes the place of the other"""
+KINDS = ("material", "python_law", "umat")
+"""Keys that say which law it is; the last one that a table has does"""
+OF_UMAT = ("properties", "strength_properties", "variables")
 
 
 @cache
@@ -81,6 +84,55 @@ def law_at(table: dict, height: float | None, where: str) -> Any:
         raise mpm.InputError(f"{where}: {error}{place}") from None
 
 
+def _kind_of(table: Mapping[str, Any]) -> str:
+    """A material, or the key of a law of one's own."""
+    own = next((key for key in KINDS[:0:-1] if key in table), "")
+    return own or table.get("material", MATERIALS[0])
+
+
+def without_effect(table: Mapping[str, Any]) -> list[str]:
+    """Keys in the table of a law that have no effect on it."""
+    kind = _kind_of(table)
+    options = [option for options, materials in ONLY_WITH.items() if kind not in materials for option in options]
+    idle = {option.strip("-").replace("-", "_") for option in options}
+    idle |= set(STRENGTHS) if "cohesion" in idle else set()
+    idle = idle - {"young", "poisson"} if kind == "umat" else idle | set(OF_UMAT)
+    idle |= set(KINDS) - {kind} if kind in KINDS else set()
+    idle |= set() if table.get("undrained", False) else {"water_modulus"}
+    return [key for key in table if key in idle]
+
+
+def idle_doubt(table: Mapping[str, Any], where: str) -> str:
+    """A warning of keys in the table of a law that have no effect on it; empty where there is none.
+
+    Args:
+        table: parameters of the law.
+        where: it stands in the file.
+    """
+    keys = without_effect(table)
+    if not keys:
+        return ""
+    drained = "" if table.get("undrained", False) else " that is not undrained" if "water_modulus" in keys else ""
+    return f"{where}: {' and '.join(keys)} {'has' if len(keys) == 1 else 'have'} no effect with the law {_kind_of(table)}{drained}"
+
+
+def give_way(below: dict, above: Mapping[str, Any]) -> None:
+    """Take out of the table of a law what one that extends it replaces: the other strength, and with another law what has no effect on that.
+
+    Args:
+        below: table of the site that is extended; it is changed.
+        above: table of the site that extends it.
+    """
+    for one, other in (STRENGTHS, STRENGTHS[::-1]):
+        if one in above and other not in above:
+            below.pop(other, None)
+    if any(key in above for key in KINDS):
+        for key in KINDS:
+            below.pop(key, None)
+        for key in without_effect({**below, **above}):
+            below.pop(key, None)
+
+
 def located(table: dict, folder: Path) -> dict:
     """The table of a law whose files are in the folder of the site's."""
     files = {key: str(folder / str(table[key])) for key in ("umat", "python_law") if key in table}
@@ -106,7 +158,8 @@ def is_profile(value: dict) -> bool:
 
 
 MODULI = ("young", "secant_modulus", "oedometer_modulus", "unloading_modulus")
-LEAST = dict.fromkeys(MODULI, 1e5) | {"cohesion": 50.0, "shear_strength": 50.0}
+STRESSES = ("vertical_preconsolidation", "reference_pressure")
+LEAST = dict.fromkeys(MODULI, 1e5) | dict.fromkeys(STRENGTHS, 50.0) | dict.fromkeys(STRESSES, 1e3)
 """Parameters [Pa] below which a soil of a site is probably given in kPa or MPa"""
 
 

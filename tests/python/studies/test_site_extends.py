@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import study_main  # noqa: F401
 from common.site_keys import read_site_table
-from common.site_laws import law_at
+from common.site_laws import idle_doubt, law_at
 from common.site_tables import MOST_FILES, site_files
 
 from mpm_core import InputError
@@ -111,3 +111,44 @@ def test_one_strength_takes_the_place_of_the_other(tmp_path):
 def test_two_strengths_of_one_soil_are_refused():
     with pytest.raises(InputError, match="soils.clay has cohesion and shear_strength, expected one of them"):
         law_at({"young": 5e6, "cohesion": 5e3, "shear_strength": 7e3}, None, "soils.clay")
+
+
+def test_another_law_leaves_out_what_has_no_effect_on_it(tmp_path, base):
+    """But not what the file that names the law gives itself, of which a warning says so."""
+    variant = written(tmp_path / "variant.toml", """
+        extends = "base/site.toml"
+        [soils.clay]
+        material = "elastic"
+        young = 3e6
+        [soils.sand]
+        material = "hardening-soil"
+        poisson = 0.3
+    """)  # fmt: skip
+    assert read_site_table(variant)["soils"] == {
+        "clay": {"unit_weight": 17e3, "material": "elastic", "young": 3e6},
+        "sand": {"unit_weight": 19e3, "material": "hardening-soil", "poisson": 0.3},
+    }
+
+
+@pytest.mark.parametrize("table, words", [
+    ({"material": "hardening-soil", "young": 2e7, "poisson": 0.3, "cohesion": 1e3},
+     "young and poisson have no effect with the law hardening-soil"),
+    ({"viscosity": 1e3, "cohesion": 1e3}, "viscosity has no effect with the law mohr-coulomb"),
+    ({"material": "elastic", "shear_strength": 1e3}, "shear_strength has no effect with the law elastic"),
+    ({"material": "tresca", "properties": [1.0]}, "properties has no effect with the law tresca"),
+    ({"young": 2e7, "umat": "law.so", "properties": [1.0], "material": "tresca"}, "material has no effect with the law umat"),
+    ({"young": 2e7, "python_law": "law.py:Sand"}, "young has no effect with the law python_law"),
+    ({"young": 2e7, "water_modulus": 1e8}, "water_modulus has no effect with the law mohr-coulomb that is not undrained"),
+])  # fmt: skip
+def test_keys_without_effect_are_named(table, words):
+    assert idle_doubt(table, "soils.clay") == f"soils.clay: {words}"
+
+
+@pytest.mark.parametrize("table", [
+    {"young": 2e7, "poisson": 0.3, "cohesion": 1e3, "friction_angle": 30.0, "porosity": 0.4, "finite_strain": True},
+    {"material": "hardening-soil", "secant_modulus": 3e7, "undrained": True, "water_modulus": 1e8},
+    {"material": "tresca", "shear_strength": 1e3, "young": 2e7},
+    {"young": 2e7, "poisson": 0.3, "umat": "law.so", "properties": [1.0]},
+])  # fmt: skip
+def test_keys_with_an_effect_are_not_named(table):
+    assert idle_doubt(table, "soils.clay") == ""

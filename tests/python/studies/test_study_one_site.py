@@ -172,12 +172,30 @@ def test_a_soil_that_no_stage_fills_is_named(tmp_path):
             ("cohesion = 10e3  # Pa", "cohesion = {value = 10.0, per_metre = 2.0, top = 8.0}"),
             r"soils.bank: cohesion is 2\d\.\d+ Pa at most, which hardly any soil has",
         ),
+        (
+            ('"mohr-coulomb"  # of effective', '"hardening-soil"\nvertical_preconsolidation = 200.0  # of effective'),
+            "soils.bank: vertical_preconsolidation is 200 Pa, which hardly any soil has",
+        ),
+        (
+            ("[soils.bank]", "[laws.weak]\nyoung = 20e3\n[soils.bank]"),
+            "laws.weak: young is 20000 Pa, which hardly any soil has",
+        ),
     ],
 )
 def test_stiffness_and_strength_in_kilopascals_are_named(change, words, tmp_path):
     from common.site_file import read_site
 
     with pytest.warns(RuntimeWarning, match=words):
+        read_site(written(tmp_path, change), MPI.COMM_WORLD, 3.0)
+
+
+@pytest.mark.parametrize("table", ["soils.bank", "laws.weak"])
+def test_a_key_without_effect_on_the_law_is_named(table, tmp_path):
+    from common.site_file import read_site
+
+    change = "[soils.bank]", "[laws.weak]\nyoung = 5e6\n[soils.bank]\n"
+    change = change[0], change[1].replace(f"[{table}]\n", f"[{table}]\nviscosity = 1e3\n")
+    with pytest.warns(RuntimeWarning, match=f"{table}: viscosity has no effect with the law mohr-coulomb"):
         read_site(written(tmp_path, change), MPI.COMM_WORLD, 3.0)
 
 
