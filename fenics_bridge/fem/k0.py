@@ -16,6 +16,9 @@ from fenics_bridge.types import OfPosition
 Surface = ArrayLike | OfPosition
 """Height of the ground: a number [m], a polyline (k, 2) of points (x, y) [m], or a function of horizontal coordinates."""
 
+LARGEST_K0 = 10.0
+"""Ratio of horizontal to vertical stress above which it is one in percent: passive earth pressure reaches 7.5 in sand of 50 degrees"""
+
 
 def k0_elastic(poisson: float) -> float:
     """K0 of an elastic body without lateral strain, nu / (1 - nu).
@@ -107,8 +110,8 @@ def _checked_layers(layers: Any) -> Any:
     bottoms, unit_weights, ratios = table.T
     if np.any(np.diff(bottoms) >= 0):
         raise InputError(f"layers has the bottoms {bottoms.tolist()} m, expected them from the top down")
-    if not (np.isfinite(ratios).all() and (ratios >= 0).all()):
-        raise InputError(f"k0 is {ratios.tolist()}, expected zero or more")
+    if not (np.isfinite(ratios).all() and (ratios >= 0).all() and (ratios <= LARGEST_K0).all()):
+        raise InputError(f"k0 is {ratios.tolist()}, expected zero or more, and at most {LARGEST_K0:g}: a ratio such as 0.5, not percent")
     if not np.isfinite(unit_weights).all():
         raise InputError(f"unit_weight is {unit_weights.tolist()} N/m3, expected finite numbers")
     return bottoms, unit_weights, ratios

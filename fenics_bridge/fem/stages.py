@@ -13,7 +13,7 @@ from mpm_core.input_warnings import warn_of_water_weight
 from mpm_core.members import Member
 
 from fenics_bridge.errors import InputError, agree, is_finite
-from fenics_bridge.fem.k0 import Surface, surface_height
+from fenics_bridge.fem.k0 import LARGEST_K0, Surface, surface_height
 from fenics_bridge.fem.supports import Support
 from fenics_bridge.types import Law, OfPosition
 from mpm_core import _core
@@ -325,8 +325,8 @@ def _wrong_value(stage: Stage, where: str) -> str | None:
             if not is_finite(value):
                 return f"{where}{name} is {value!r} for {key!r}, expected a finite number"
     for key, value in stage.k0.items():
-        if not (is_finite(value) and value > 0):
-            return f"{where}k0 is {value!r} for {key!r}, expected a number above 0"
+        if not (is_finite(value) and 0 < value <= LARGEST_K0):
+            return f"{where}k0 is {value!r} for {key!r}, expected a number above 0 and up to {LARGEST_K0:g}, such as 0.5"
     if stage.k0 and stage.stress is not None:
         return f"{where}stress and k0 are given, expected one of them"
     for key, law in stage.law.items():

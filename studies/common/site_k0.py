@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from fenics_bridge.fem.k0 import LARGEST_K0
 
 from .checks import say
 from .site_laws import is_number
@@ -24,12 +25,14 @@ def k0_of(soils: Mapping[str, Mapping[str, Any]], path: Path) -> dict[str, float
     """K0 [-] by soil, of those that have one.
 
     Raises:
-        InputError: one is no number above 0.
+        InputError: one is no number above 0, or so large that it is in percent.
     """
     found = {soil: given[KEY] for soil, given in soils.items() if KEY in given}
     for soil, value in found.items():
-        if not (is_number(value) and value > 0):
-            raise mpm.InputError(f"{path}: soils.{soil}: {KEY} is {value!r}, expected a number above 0")
+        if not (is_number(value) and 0 < value <= LARGEST_K0):
+            raise mpm.InputError(
+                f"{path}: soils.{soil}: {KEY} is {value!r}, expected a number above 0 and up to {LARGEST_K0:g}, such as 0.5"
+            )
     return found
 
 

@@ -138,6 +138,7 @@ def test_a_variant_changes_k0(tmp_path):
     [
         ("k0 = 1.3", "k0 = 0", "site.toml: soils.clay: k0 is 0, expected a number above 0"),
         ("k0 = 1.3", 'k0 = "1 - sin(phi)"', r"site.toml: soils.clay: k0 is '1 - sin\(phi\)', expected a number above 0"),
+        ("k0 = 1.3", "k0 = 130", "site.toml: soils.clay: k0 is 130, expected a number above 0 and up to 10, such as 0.5"),
         ("k0 = 1.3", "k0 = true", "site.toml: soils.clay: k0 is True, expected a number above 0"),
         ("[soils.fill]", "[soils.fill]\nk0 = 0.6",
          "site.toml: soils.fill: k0 is 0.6, but the stage 'fill' places this soil, expected none: only soil that is there from the beginning"),
