@@ -12,7 +12,7 @@ from fenics_bridge import water
 
 from .parameters import unknown_key
 from .site_k0 import KEY as K0
-from .site_laws import give_way, is_number, law_keys, located
+from .site_laws import give_way, is_number, law_keys, leave_out_idle, located
 from .site_tables import MOST_FILES, merged, parsed
 
 DAY = 86400.0
@@ -74,7 +74,11 @@ def read_site_table(path: Path, needed: Sequence[str] = ()) -> dict[str, Any]:
     Raises:
         InputError: it cannot be read, is not TOML, has a key that no study knows or lacks one that is needed.
     """
-    table = _extended(path)
+    files: list[dict[str, Any]] = []
+    table = _extended(path, files)
+    for key in ("soils", "laws"):
+        for name, law in table.get(key, {}).items():
+            leave_out_idle(law, [file.get(key, {}).get(name, {}) for file in files])
     for key in ("mesh", "soils", *needed):
         if key not in table:
             raise mpm.InputError(f"{path} has no {key!r}, which this study needs: {KEYS[key]}")
@@ -95,9 +99,10 @@ def read_site_table(path: Path, needed: Sequence[str] = ()) -> dict[str, Any]:
     return table
 
 
-def _extended(path: Path, depth: int = 1) -> dict[str, Any]:
-    """The file of a site as a table, over those that it extends; depth: number of this file among them."""
+def _extended(path: Path, files: list[dict[str, Any]]) -> dict[str, Any]:
+    """The file of a site as a table, over those that it extends; files: tables of those that extend it, to which its own is added."""
     table = parsed(path)
+    files.append(table)
     _require_known(table, KEYS, str(path))
     for key, known in (("soils", (*FLOW, "unit_weight", K0, *law_keys())), ("laws", law_keys()), ("boundaries", WATER)):
         for name, given in _table_at(table, key, str(path)).items():
@@ -107,11 +112,11 @@ def _extended(path: Path, depth: int = 1) -> dict[str, Any]:
     base = table.pop("extends")
     if not isinstance(base, str):
         raise mpm.InputError(f"{path}: extends is {base!r}, expected the file of a site")
-    if depth == MOST_FILES:
+    if len(files) == MOST_FILES:
         raise mpm.InputError(
             f"{path}: extends is {base!r}, expected at most {MOST_FILES} files that extend one another"
         )
-    below, folder = _extended(path.parent / base, depth + 1), (path.parent / base).parent
+    below, folder = _extended(path.parent / base, files), (path.parent / base).parent
     if "mesh" in below:
         below["mesh"] = str(folder.resolve() / str(below["mesh"]))
     for key in ("soils", "laws"):

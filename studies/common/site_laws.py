@@ -117,20 +117,30 @@ def idle_doubt(table: Mapping[str, Any], where: str) -> str:
 
 
 def give_way(below: dict, above: Mapping[str, Any]) -> None:
-    """Take out of the table of a law what one that extends it replaces: the other strength, and with another law what has no effect on that.
+    """Take out of the table of a law what one that extends it replaces: the other strength, and the other kind of law.
 
     Args:
         below: table of the site that is extended; it is changed.
         above: table of the site that extends it.
     """
-    for one, other in (STRENGTHS, STRENGTHS[::-1]):
-        if one in above and other not in above:
-            below.pop(other, None)
-    if any(key in above for key in KINDS):
-        for key in KINDS:
-            below.pop(key, None)
-        for key in without_effect({**below, **above}):
-            below.pop(key, None)
+    for kinds in (STRENGTHS, KINDS):
+        if any(key in above for key in kinds):
+            for key in set(kinds) - set(above):
+                below.pop(key, None)
+
+
+def leave_out_idle(table: dict, files: Sequence[Mapping[str, Any]]) -> None:
+    """Take out of the table of a law what has no effect on it, and comes from below the file that names the law.
+
+    Args:
+        table: of the law, of all files together; it is changed.
+        files: the tables of the files that extend one another, the last one extended by all.
+    """
+    names_it = (number for number, given in enumerate(files, 1) if any(key in given for key in KINDS))
+    own = {key for given in files[: next(names_it, len(files))] for key in given}
+    for key in without_effect(table):
+        if key not in own:
+            del table[key]
 
 
 def located(table: dict, folder: Path) -> dict:

@@ -130,6 +130,15 @@ def test_another_law_leaves_out_what_has_no_effect_on_it(tmp_path, base):
     }
 
 
+def test_a_law_that_comes_back_has_its_parameters_again(tmp_path, base):
+    """As in a sweep of the material of a variant."""
+    base.write_text(BASE.replace("[soils.clay]", "[soils.clay]\nyoung = 4e6"))
+    written(tmp_path / "first.toml", 'extends = "base/site.toml"\nsoils.clay.material = "hardening-soil"\n')
+    second = written(tmp_path / "second.toml", 'extends = "first.toml"\nsoils.clay.material = "mohr-coulomb"\n')
+    assert "young" not in read_site_table(tmp_path / "first.toml")["soils"]["clay"]
+    assert read_site_table(second)["soils"]["clay"]["young"] == 4e6
+
+
 @pytest.mark.parametrize("table, words", [
     ({"material": "hardening-soil", "young": 2e7, "poisson": 0.3, "cohesion": 1e3},
      "young and poisson have no effect with the law hardening-soil"),
