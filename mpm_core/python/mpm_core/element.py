@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from .checks import positive, real_numbers, within
 from .mesh import floats
 
 MAX_ITERATIONS = 50
+MAX_HALVINGS = 10
 
 
 class ElementTest:
@@ -106,9 +108,23 @@ class ElementTest:
                 return True
             # On an edge of Mohr-Coulomb two stresses are equal whatever the strains: of all of these the smallest step
             step, *_ = np.linalg.lstsq(tangent[np.ix_(free, free)], (new - target)[free], rcond=1e-12)
-            increment[free] -= step
-            new, state, tangent = self._updated(increment)
+            new, state, tangent = self._moved(increment, free, step)
         return False
+
+    def _moved(
+        self, increment: NDArray[np.float64], free: NDArray[np.bool_], step: NDArray[np.float64]
+    ) -> tuple[NDArray, NDArray, NDArray]:
+        """Take a step off the free components of the increment, in place, or a fraction of it that the law can follow, and update the point.
+
+        Soil without stress is so soft that a step may be far too long for a law whose stiffness grows with the stress.
+        """
+        start = increment[free]
+        for halvings in range(MAX_HALVINGS):
+            increment[free] = start - 0.5**halvings * step
+            with suppress(RunError):
+                return self._updated(increment)
+        increment[free] = start - step
+        return self._updated(increment)
 
     def _tolerance(self, stress: NDArray[np.float64]) -> float:
         return 1e-9 * float(np.abs(stress).max()) + 1e-12 * self.law.p_wave_modulus

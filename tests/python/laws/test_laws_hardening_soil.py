@@ -285,3 +285,14 @@ def test_bad_states_are_asked_for_by_name():
         mpm.hardening_soil_state(sand(), isotropic(1e3)[None], 0.5)
     with pytest.raises(mpm.InputError, match=r"stress has shape \(1, 3\)"):
         mpm.hardening_soil_state(sand(), np.zeros((1, 3)))
+
+
+def test_one_increment_from_a_hundredth_of_the_stress_has_the_strain_of_the_oedometer_modulus():
+    """With an exponent of 1 and without cohesion the first step of Newton's method is too long for the law, by dozens of percent of strain."""
+    law = mpm.HardeningSoil(
+        secant_modulus=4e6, oedometer_modulus=3e6, unloading_modulus=12e6, cohesion=0.0, friction_angle=24.0, exponent=1.0
+    )
+    k0 = 1 - np.sin(np.radians(24.0))
+    test = mpm.ElementTest(law, stress=[-1e3, -k0 * 1e3, -k0 * 1e3, 0.0, 0.0, 0.0])
+    test.step([None, 0.0, 0.0, 0.0, 0.0, 0.0], stress=[-100e3, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert -test.strain[0] == pytest.approx(100e3 / 3e6 * np.log(100.0), rel=1e-3)
