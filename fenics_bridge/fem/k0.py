@@ -111,7 +111,9 @@ def _checked_layers(layers: Any) -> Any:
     if np.any(np.diff(bottoms) >= 0):
         raise InputError(f"layers has the bottoms {bottoms.tolist()} m, expected them from the top down")
     if not (np.isfinite(ratios).all() and (ratios >= 0).all() and (ratios <= LARGEST_K0).all()):
-        raise InputError(f"k0 is {ratios.tolist()}, expected zero or more, and at most {LARGEST_K0:g}: a ratio such as 0.5, not percent")
+        raise InputError(
+            f"k0 is {ratios.tolist()}, expected zero or more, and at most {LARGEST_K0:g}: a ratio such as 0.5, not percent"
+        )
     if not np.isfinite(unit_weights).all():
         raise InputError(f"unit_weight is {unit_weights.tolist()} N/m3, expected finite numbers")
     return bottoms, unit_weights, ratios

@@ -326,7 +326,9 @@ def _wrong_value(stage: Stage, where: str) -> str | None:
                 return f"{where}{name} is {value!r} for {key!r}, expected a finite number"
     for key, value in stage.k0.items():
         if not (is_finite(value) and 0 < value <= LARGEST_K0):
-            return f"{where}k0 is {value!r} for {key!r}, expected a number above 0 and up to {LARGEST_K0:g}, such as 0.5"
+            return (
+                f"{where}k0 is {value!r} for {key!r}, expected a number above 0 and up to {LARGEST_K0:g}, such as 0.5"
+            )
     if stage.k0 and stage.stress is not None:
         return f"{where}stress and k0 are given, expected one of them"
     for key, law in stage.law.items():

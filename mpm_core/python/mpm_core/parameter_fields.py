@@ -91,7 +91,10 @@ def differences_of(
         assert part is not None
         new[rows, first] = values[rows] - nominal_value(law, name)
         first -= part.varying.index(name)
-        part.check_points(np.ascontiguousarray(new[rows, first : first + len(part.varying)]))
+        try:
+            part.check_points(np.ascontiguousarray(new[rows, first : first + len(part.varying)]))
+        except InputError as error:  # the value may be one of another parameter, which does not fit to those given
+            raise InputError(str(error) if name in str(error) else f"with the values of {name}, {error}") from None
     return new
 
 

@@ -292,7 +292,10 @@ def test_particles_beyond_the_strength_are_warned_of(pit):
         ({"k0": 0.5}, "stage 'a': k0 is 0.5, expected a dictionary by soil"),
         ({"k0": {"ground": 0.0}}, "stage 'a': k0 is 0.0 for 'ground', expected a number above 0"),
         ({"k0": {"ground": np.nan}}, "stage 'a': k0 is nan for 'ground', expected a number above 0"),
-        ({"k0": {"ground": 50}}, "stage 'a': k0 is 50 for 'ground', expected a number above 0 and up to 10, such as 0.5"),
+        (
+            {"k0": {"ground": 50}},
+            "stage 'a': k0 is 50 for 'ground', expected a number above 0 and up to 10, such as 0.5",
+        ),
         ({"k0": {"sand": 0.5}}, "stage 'a': k0: .*'sand'"),
         ({"k0": {"pit 1": 0.5}}, "stage 'a': k0 is given for 'pit 1', expected a soil of fill"),
         ({"k0": {"ground": 0.5}, "stress": lambda x: x}, "stage 'a': stress and k0 are given, expected one of them"),

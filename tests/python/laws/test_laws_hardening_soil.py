@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from core_cases import box
 from hardening_soil_cases import (
     REFERENCE,
     SAND,
@@ -290,9 +291,27 @@ def test_bad_states_are_asked_for_by_name():
 def test_one_increment_from_a_hundredth_of_the_stress_has_the_strain_of_the_oedometer_modulus():
     """With an exponent of 1 and without cohesion the first step of Newton's method is too long for the law, by dozens of percent of strain."""
     law = mpm.HardeningSoil(
-        secant_modulus=4e6, oedometer_modulus=3e6, unloading_modulus=12e6, cohesion=0.0, friction_angle=24.0, exponent=1.0
+        secant_modulus=4e6,
+        oedometer_modulus=3e6,
+        unloading_modulus=12e6,
+        cohesion=0.0,
+        friction_angle=24.0,
+        exponent=1.0,
     )
     k0 = 1 - np.sin(np.radians(24.0))
     test = mpm.ElementTest(law, stress=[-1e3, -k0 * 1e3, -k0 * 1e3, 0.0, 0.0, 0.0])
     test.step([None, 0.0, 0.0, 0.0, 0.0, 0.0], stress=[-100e3, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert -test.strain[0] == pytest.approx(100e3 / 3e6 * np.log(100.0), rel=1e-3)
+
+
+def test_values_that_vary_and_do_not_fit_to_the_other_parameters_are_named():
+    law = mpm.Heterogeneous(
+        mpm.HardeningSoil(
+            secant_modulus=10e6, oedometer_modulus=10e6, unloading_modulus=30e6, cohesion=4e3, friction_angle=26.0
+        ),
+        ["friction_angle"],
+    )
+    model = mpm.Model(box([2, 2], body=([0.0, 0.0], [1.0, 1.0])), law)
+    model.seed(density=1800.0, per_cell=1)
+    with pytest.raises(mpm.InputError, match="with the values of friction_angle, oedometer_modulus = .*must be below"):
+        model.set_parameter("friction_angle", 44.0)
