@@ -123,7 +123,7 @@ def test_soil_at_failure_dilates_by_its_angle_and_contracts_before():
     strain, _ = triaxial(mpm.ElementTest(law, isotropic(100e3)), -0.06, 600)
     volume = -strain[:, :3].sum(axis=1)
     rate = (volume[-1] - volume[-100]) / (strain[-100, 0] - strain[-1, 0])
-    assert rate == pytest.approx(-2 * sine / (1 - sine), rel=1e-6)
+    assert rate == pytest.approx(-2 * sine / (1 - sine), rel=1e-4)
     assert volume[:20].max() > 0 and (np.diff(volume[:5]) > 0).all()
     no_dilation, _ = triaxial(mpm.ElementTest(sand(dilation_angle=0.0), isotropic(100e3)), -0.06, 600)
     assert (np.diff(-no_dilation[:, :3].sum(axis=1)) > -1e-9).all()
