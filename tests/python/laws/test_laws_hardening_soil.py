@@ -158,7 +158,9 @@ def test_soil_at_failure_dilates_by_its_angle_in_plane_strain_and_extension(angl
             test.step([None if e is None else 1e-3 * e for e in direction])
         strain = (test.strain - before)[:3]  # elastic strains do not change
         assert strain.sum() / np.abs(strain).sum() == pytest.approx(sine, abs=0.01 * sine + 1e-6)
-        assert test.stress[:3] @ strain > -0.01 * 100e3 * np.abs(strain).sum()  # zero for associated flow without cohesion
+        assert (
+            test.stress[:3] @ strain > -0.01 * 100e3 * np.abs(strain).sum()
+        )  # zero for associated flow without cohesion
         assert test.state[0] > plastic and sign * strain[0] < 0
 
 
