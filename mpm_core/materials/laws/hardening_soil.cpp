@@ -255,9 +255,7 @@ void check(const HardeningSoil& law)
   const double most = std::min(1 / std::max(test.volumetric, 0.0), 2.0 / 3 / test.deviatoric);
   require(law.oedometer_modulus < most, "oedometer_modulus", law.oedometer_modulus,
           "below " + number_text(rounded_down(most)) +
-              " Pa, the modulus that the other parameters give without a cap (a smaller secant_modulus or "
-              "unloading_modulus "
-              "would be softer)");
+              " Pa, which a larger secant_modulus or unloading_modulus raises");
 }
 
 template <int D>

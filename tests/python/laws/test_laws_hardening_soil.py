@@ -281,6 +281,8 @@ def test_the_largest_oedometer_modulus_is_one_that_can_be_reached():
     assert SAND["oedometer_modulus"] < most
     with pytest.raises(mpm.InputError):
         sand(oedometer_modulus=1.001 * most)
+    sand(oedometer_modulus=1.001 * most, secant_modulus=1.05 * SAND["secant_modulus"])  # as the message says
+    sand(oedometer_modulus=1.001 * most, unloading_modulus=1.1 * SAND["unloading_modulus"])
 
 
 def test_bad_states_are_asked_for_by_name():
