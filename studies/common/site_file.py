@@ -48,7 +48,7 @@ from .site_fields import SoilField, fields_of, values_of, varying
 from .site_interfaces import fractions_of, in_stages, split_beside, weakened
 from .site_k0 import k0_of, with_k0
 from .site_keys import CHANGES, STAGE_WATER, changes_of, member_of, part_of, read_site_table, require_push
-from .site_laws import idle_doubt, is_number, law_at, law_keys, located, unit_doubt, unit_weight_of
+from .site_laws import idle_doubt, is_number, law_at, law_keys, left_out_doubt, located, unit_doubt, unit_weight_of
 from .site_mesh import check_soils, geometry_of, site_mesh
 from .site_supports import support_of, supports_of
 from .slope_case import GRAVITY
@@ -241,12 +241,13 @@ def site_of(
             laws |= dict.fromkeys(bridge.names_of(cell_tags).get(soil, (soil,)), law)
         say(unit_doubt(parameters, where, heights.values()))
         say(idle_doubt(part_of(given, law_keys()), where))
+        say(left_out_doubt(parameters, where))
     others = {
         name: law_at(located(given, path.parent), None, f"{path}: laws.{name}")
         for name, given in table.get("laws", {}).items()
     }
     for name, given in table.get("laws", {}).items():
-        for doubt in (unit_doubt, idle_doubt):
+        for doubt in (unit_doubt, idle_doubt, left_out_doubt):
             say(doubt(given, f"{path}: laws.{name}"))
     members = {name: member_of(given, f"{path}: members.{name}") for name, given in table.get("members", {}).items()}
     _require_columns(members, path)

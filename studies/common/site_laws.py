@@ -116,6 +116,45 @@ def idle_doubt(table: Mapping[str, Any], where: str) -> str:
     return f"{where}: {' and '.join(keys)} {'has' if len(keys) == 1 else 'have'} no effect with the law {_kind_of(table)}{drained}"
 
 
+NEEDED_BY: Mapping[str, Sequence[Any]] = {
+    "mohr-coulomb": (mpm.MohrCoulomb,),
+    "drucker-prager": (mpm.MohrCoulomb,),
+    "viscoplastic": (mpm.ViscoplasticMohrCoulomb,),
+    "softening": (mpm.MohrCoulomb, mpm.SofteningMohrCoulomb),
+    "hardening-soil": (mpm.HardeningSoil,),
+    "cam-clay": (mpm.CamClay,),
+    "nor-sand": (mpm.NorSand,),
+    "elastic": (mpm.LinearElastic,),
+}
+"""Laws whose parameters without a default a material needs; those of `tresca` and `von-mises` are stiffness and strength"""
+OPTION_OF = {"compression": "compression_slope", "swelling": "swelling_slope"}
+"""Keys of parameters of Cam-Clay that have another name in studies"""
+
+
+def needed_keys(material: str) -> list[str]:
+    """Keys of the parameters that a material needs: those without a default in its law; none for laws of one's own."""
+    if material in ("tresca", "von-mises"):
+        return ["young", "poisson", "cohesion"]
+    declared = [parameter for law in NEEDED_BY.get(material, ()) for parameter in law.parameters]
+    return [OPTION_OF.get(p.name, p.name) for p in declared if p.needed and p.unit is not None]
+
+
+def left_out_doubt(table: Mapping[str, Any], where: str) -> str:
+    """A warning of parameters that a law needs and its table does not have, with the values that are taken; empty where there is none.
+
+    Args:
+        table: parameters of the law.
+        where: it stands in the file.
+    """
+    given = {"cohesion" if key in STRENGTHS else key for key in table}
+    missing = [key for key in needed_keys(_kind_of(table)) if key not in given]
+    if not missing:
+        return ""
+    values, units = vars(_parser().parse_args([])), law_units()
+    taken = [f"{key} = {values[key]:g}{'' if units[key] == '-' else ' ' + units[key]}" for key in missing]
+    return f"{where} leaves out what its law {_kind_of(table)} needs: {', '.join(taken)} {'is' if len(missing) == 1 else 'are'} taken"
+
+
 def give_way(below: dict, above: Mapping[str, Any]) -> None:
     """Take out of the table of a law what one that extends it replaces: the other strength, and the other kind of law.
 

@@ -199,6 +199,22 @@ def test_a_key_without_effect_on_the_law_is_named(table, tmp_path):
         read_site(written(tmp_path, change), MPI.COMM_WORLD, 3.0)
 
 
+def test_parameters_that_a_law_needs_and_a_soil_leaves_out_are_named_with_their_values(tmp_path):
+    from common.site_file import read_site
+    from common.site_laws import left_out_doubt
+
+    change = "[soils.bank]", "[laws.weak]\nyoung = 5e6\ncohesion = 2e3\n[soils.bank]"
+    words = (
+        "laws.weak leaves out what its law mohr-coulomb needs: poisson = 0.33, friction_angle = 25 degrees are taken"
+    )
+    with pytest.warns(RuntimeWarning, match=words):
+        read_site(written(tmp_path, change), MPI.COMM_WORLD, 3.0)
+    clay = {"material": "tresca", "young": 5e6, "poisson": 0.45, "shear_strength": 20e3}
+    assert left_out_doubt(clay, "clay") == "" and left_out_doubt({"umat": "soil.so"}, "clay") == ""
+    del clay["poisson"]
+    assert left_out_doubt(clay, "clay") == "clay leaves out what its law tresca needs: poisson = 0.33 is taken"
+
+
 def test_a_strength_that_is_small_at_the_top_only_is_not_named(tmp_path):
     from common.site_file import read_site
 
