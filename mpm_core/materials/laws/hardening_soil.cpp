@@ -30,12 +30,11 @@ double normal_k0(const HardeningSoil& law)
 /// Without the cap, whose constants follow from it
 Oedometer oedometer_of(const HardeningSoil& law, const Soil& soil)
 {
-  const double k0 = normal_k0(law), least = law.reference_pressure * k0 + soil.attraction;
+  const double k0 = normal_k0(law);
   const Dual<1> vertical = variable<1>(law.reference_pressure, 0), smallest = k0 * vertical + soil.attraction;
   const Dual<1> q = vertical - k0 * vertical, mobilised = q / (soil.slope * smallest);
-  const double young = soil.unloading * std::pow(least / soil.reference, soil.exponent);
-  const Dual<1> softness = chained(smallest, softness_of(soil, smallest.value),
-                                   -soil.exponent * softness_of(soil, smallest.value) / smallest.value);
+  const double here = softness_of(soil, smallest.value), young = soil.unloading / here;
+  const Dual<1> softness = chained(smallest, here, -soil.exponent * here / smallest.value);
   const double sheared = std::max(shear_of(soil, smallest, softness, mobilised).slopes[0], 0.0);
   const double dilation = dilatancy(soil, mobilised.value), pressure_slope = (1 + 2 * k0) / 3;
   const double elastic = pressure_slope / (soil.bulk_per_young() * young);
@@ -77,12 +76,23 @@ void set_start(Soil& soil, const HardeningSoil& law, double vertical)
   soil.cap = cap_through(soil, pressure, q, direction_of(soil, 1.0).cap);
 }
 
+/// Stresses of the law from the apex on [Pa]
+struct Stresses
+{
+  double attraction, reference, least;
+};
+
+Stresses stresses_of(const HardeningSoil& law)
+{
+  const double apex = law.cohesion / std::tan(law.friction_angle * degree), reference = law.reference_pressure + apex;
+  return {apex, reference, std::max(apex - law.tension_cutoff, least_stress * reference)};
+}
+
 /// The soil with its full strength, without cap
 Soil uncapped(const HardeningSoil& law)
 {
+  const auto [apex, reference, least] = stresses_of(law);
   const double sine = std::sin(law.friction_angle * degree), dilation = std::sin(law.dilation_angle * degree);
-  const double apex = law.cohesion / std::tan(law.friction_angle * degree);
-  const double reference = law.reference_pressure + apex;
   return {apex,
           reference,
           2 * sine / (1 - sine),
@@ -95,7 +105,7 @@ Soil uncapped(const HardeningSoil& law)
           (3 + sine) / (3 - sine),
           0,
           1,
-          std::max(apex - law.tension_cutoff, least_stress * reference),
+          least,
           0,
           0};
 }
@@ -265,13 +275,12 @@ double smallest_stress(const HardeningSoil& law, const SymTensor<D>& stress)
   return -mean<D>(stress) - direction.smallest * q;
 }
 
-double attraction(const HardeningSoil& law) { return hardening_soil::uncapped(law).attraction; }
+double attraction(const HardeningSoil& law) { return hardening_soil::stresses_of(law).attraction; }
 
 double unloading_modulus(const HardeningSoil& law, double stress)
 {
-  const hardening_soil::Soil soil = hardening_soil::uncapped(law);
-  const double above = std::max(stress + soil.attraction, soil.least);
-  return law.unloading_modulus * std::pow(above / soil.reference, law.exponent);
+  const auto [apex, reference, least] = hardening_soil::stresses_of(law);
+  return law.unloading_modulus * std::pow(std::max(stress + apex, least) / reference, law.exponent);
 }
 
 double shear_modulus(const HardeningSoil& law) { return 0.5 * law.unloading_modulus / (1 + law.poisson); }
