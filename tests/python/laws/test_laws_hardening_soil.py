@@ -18,6 +18,7 @@ from hardening_soil_cases import (
 )
 from law_cases import triaxial
 
+import fenics_bridge as bridge
 import mpm_core as mpm
 
 
@@ -245,11 +246,9 @@ def test_tension_is_cut_off_in_each_direction():
 def test_strength_reduction_divides_cohesion_and_tangent():
     law, factor = clay(), 1.3
     reduced = mpm.MohrCoulomb(young=1e6, poisson=0.2, cohesion=8e3, friction_angle=24.0)
-    from fenics_bridge import reduced_strength
-
-    weaker = reduced_strength(law, factor)
+    weaker = bridge.reduced_strength(law, factor)
     assert weaker.strength_factor == factor
-    strong = reduced_strength(reduced, factor)
+    strong = bridge.reduced_strength(reduced, factor)
     _, stress = triaxial(mpm.ElementTest(weaker, isotropic(50e3)), -0.2, 400)
     sine = np.sin(np.radians(strong.friction_angle))
     expected = 2 * sine / (1 - sine) * (50e3 + strong.cohesion / np.tan(np.radians(strong.friction_angle)))
