@@ -42,6 +42,15 @@ TEST(Lode, CosineIsThatOfThePrincipalValuesInAnyAxes)
   EXPECT_EQ(lode_cosine(0.0, 0.0), 1);
 }
 
+TEST(Lode, ThirdOfAnAngleIsThatOfTheStandardLibrary)
+{
+  for (double cosine = -1; cosine <= 1; cosine += 1e-4)
+    EXPECT_NEAR(third_cosine(cosine), std::cos(std::acos(cosine) / 3), 5e-16) << cosine;
+  for (double beside = 1e-15; beside < 1e-3; beside *= 2) // where the arc cosine changes fast
+    for (const double cosine : {1 - beside, beside - 1})
+      EXPECT_NEAR(third_cosine(cosine), std::cos(std::acos(cosine) / 3), 5e-16) << beside;
+}
+
 TEST(Lode, SlopeIsTheDerivativeOfTheCosineAndAbsentInCompressionAndExtension)
 {
   std::mt19937 random(3);

@@ -59,12 +59,19 @@ void set_cap(Soil& soil, const HardeningSoil& law, const Oedometer& test)
   soil.cap_modulus = cap_change / volumetric * std::pow(cap / soil.reference, -soil.exponent);
 }
 
-/// gamma of a stress on the hyperbola, at most that of failure
+/// (s1 - s3) / q_f, at most that of failure
 /// @param stress      s3 + a
 /// @param difference  s1 - s3
+template <class N>
+N mobilised_by(const Soil& soil, const N& stress, const N& difference)
+{
+  return smaller<N>(difference / (soil.slope * stress), N{} + 1);
+}
+
+/// gamma of a stress on the hyperbola, at most that of failure
 double hyperbola(const Soil& soil, double stress, double difference)
 {
-  return shear_of(soil, stress, softness_of(soil, stress), std::min(difference / (soil.slope * stress), 1.0));
+  return shear_of(soil, stress, softness_of(soil, stress), mobilised_by(soil, stress, difference));
 }
 
 /// Sets gamma and p_p of ground that has carried a vertical stress.
@@ -131,68 +138,90 @@ Soil soil_of(const HardeningSoil& law)
 }
 
 /// A deviator's q and the direction of it
-template <int D>
-std::pair<double, Direction<double>> shape_of(const Soil& soil, const SymTensor<D>& deviator)
+template <int D, class N = double>
+std::pair<N, Direction<N>> shape_of(const Soil& soil, const std::array<N, n_stress<D>>& deviator)
 {
-  const auto square = square_along<D>(deviator, {});
-  const double q = std::sqrt(square[0]);
-  return {q, direction_of(soil, lode_cosine(-13.5 * determinant<D>(deviator), q))};
+  const N q = root(square_along<D, N>(deviator, {})[0]);
+  return {q, direction_of(soil, lode_cosine<N>(-13.5 * determinant<D, N>(deviator), q))};
 }
 
-template <int D>
-struct Tensors
+/// gamma, and ln of p_p over that of the law's start
+template <class N>
+struct Hardening
 {
-  SymTensor<D> stress, strain; ///< deviators, tension positive
+  N shear, growth;
 };
 
-/// gamma and p_p of a point before the increment. Soil that has never been loaded begins with those of its stress,
-/// where they are more than those of the law.
-/// @param pressure, stress  p + a and s3 + a
-template <int D>
-std::pair<double, double> hardening_of(const Soil& soil, const PointBatch<D>& points, Index i, double pressure,
-                                       double stress, double q, const Direction<double>& direction)
+/// Those of a point before the increment. Soil that has never been loaded begins with those of its stress, where they
+/// are more than those of the law.
+/// @param own  those of the stress
+template <int D, class N>
+Hardening<N> hardening_of(const Soil& soil, const PointBatch<D>& points, Index i, auto&& own)
 {
-  const double plastic = points.state[0][i], shear = points.state[1][i], growth = points.state[2][i];
-  if (plastic != 0 || shear != 0 || growth != 0)
-    return {soil.shear + shear, soil.cap * std::exp(growth)};
-  return {std::max(soil.shear, hyperbola(soil, stress, direction.difference * q)),
-          std::max(soil.cap, cap_through(soil, pressure, q, direction.cap))};
+  const N plastic = load_as<N>(points.state[0] + i), shear = load_as<N>(points.state[1] + i);
+  const N growth = load_as<N>(points.state[2] + i);
+  const Mask<N> is_new = (plastic == 0) & (shear == 0) & (growth == 0);
+  Hardening<N> hardening{soil.shear + shear, growth};
+  if (any(is_new))
+  {
+    const Hardening<N> begun = own();
+    hardening = {chosen<N>(is_new, larger<N>(begun.shear, N{} + soil.shear), hardening.shear),
+                 chosen<N>(is_new, larger<N>(begun.growth, N{}), hardening.growth)};
+  }
+  return hardening;
 }
 
-template <int D>
-Start start_of(const Soil& soil, const PointBatch<D>& points, Index i, Tensors<D>& tensors)
+template <int D, class N>
+Start<N> start_of(const Soil& soil, const PointBatch<D>& points, Index i, Deviators<D, N>& deviators)
 {
-  const auto [stress, strain] = tensors_of<D>(points, i);
-  tensors = {deviator<D>(stress), deviator<D>(strain)};
-  const auto [q, direction] = shape_of<D>(soil, tensors.stress);
-  const double pressure = soil.attraction - mean<D>(stress);
-  const double smallest = std::max(pressure - direction.smallest * q, soil.least);
-  const auto [shear, cap] = hardening_of<D>(soil, points, i, pressure, smallest, q, direction);
+  const auto [stress, strain] = tensors_of<D, N>(points, i);
+  deviators = {deviator<D, N>(stress), deviator<D, N>(strain)};
+  const auto [q, direction] = shape_of<D, N>(soil, deviators.stress);
+  const N pressure = soil.attraction - mean<D, N>(stress);
+  const N smallest = larger<N>(pressure - direction.smallest * q, N{} + soil.least);
+  const N softness = softness_of(soil, smallest), mobilised = mobilised_by<N>(soil, smallest, direction.difference * q);
+  const auto [shear, growth] =
+      hardening_of<D, N>(soil, points, i,
+                         [&, q = q, w = direction.cap]
+                         {
+                           return Hardening<N>{shear_of(soil, smallest, softness, mobilised),
+                                               logarithm<N>(cap_through(soil, pressure, q, w) / soil.cap)};
+                         });
+  const N cap = soil.cap * each(growth, [](double x) { return falling_exponential(-x); });
   return {pressure,
           smallest,
-          softness_of(soil, smallest),
-          std::min(direction.difference * q / (soil.slope * smallest), 1.0),
+          softness,
+          mobilised,
           shear,
           cap,
-          -3 * mean<D>(strain),
-          square_along<D>(tensors.stress, tensors.strain),
-          cube_along<D>(tensors.stress, tensors.strain)};
+          growth,
+          cap_compliance(soil, cap),
+          -3 * mean<D, N>(strain),
+          square_along<D, N>(deviators.stress, deviators.strain),
+          cube_along<D, N>(deviators.stress, deviators.strain)};
 }
 
-bool is_sound(const Start& start)
+template <class N>
+Mask<N> is_sound(const Start<N>& start)
 {
-  return std::abs(start.pressure) + start.stress + start.cap < most_stress && std::isfinite(start.shear) &&
-         std::abs(start.volumetric) + std::abs(start.square[1]) + start.square[2] < most_stress;
+  return (absolute(start.pressure) + start.stress + start.cap < most_stress) & (absolute(start.shear) < most_stress) &
+         (absolute(start.volumetric) + absolute(start.square[1]) + start.square[2] < most_stress);
+}
+
+template <class N>
+Mask<N> is_sound(const End<N>& end)
+{
+  return end.pressure + end.trial_q < most_stress;
 }
 
 template <int D>
-void write_tangent(const Soil& soil, const Start& start, const Solution& solution, const Tensors<D>& tensors,
-                   double* tangent)
+void write_tangent(const Soil& soil, const Start<double>& start, const Solution<double>& solution,
+                   const Deviators<D, double>& deviators, double* tangent)
 {
   using T = Dual<5>;
   const auto& [log_stress, mobilised] = solution.at;
   const End<T> end = end_of<T>(soil, start, {variable<5>(log_stress, 0), variable<5>(mobilised, 1)},
-                               {variable<5>(0, 2), variable<5>(0, 3), variable<5>(0, 4)});
+                               {variable<5>(0.0, 2), variable<5>(0.0, 3), variable<5>(0.0, 4)});
   const auto& volume = end.volumetric.slopes;
   const auto& shape = end.deviatoric.slopes;
   const double determinant = volume[0] * shape[1] - volume[1] * shape[0];
@@ -208,34 +237,56 @@ void write_tangent(const Soil& soil, const Start& start, const Solution& solutio
   const auto slopes = [&](std::size_t by) {
     return SecantSlopes{total(end.pressure, by), total(end.shear_modulus, by), total(ratio, by)};
   };
-  const SecantTrial<D> trial = secant_trial<D>(end.shear_modulus.value, tensors.stress, tensors.strain);
-  write_secant_tangent<D>(trial, tensors.strain, ratio.value, slopes(2), slopes(3), tangent);
+  const SecantTrial<D> trial = secant_trial<D>(end.shear_modulus.value, deviators.stress, deviators.strain);
+  write_secant_tangent<D>(trial, deviators.strain, ratio.value, slopes(2), slopes(3), tangent);
   const double cosine = lode_cosine(polynomial<double>(start.cube, 2 * trial.shear), trial.q);
-  add_secant_tangent<D>(trial, tensors.strain, ratio.value, slopes(4),
+  add_secant_tangent<D>(trial, deviators.strain, ratio.value, slopes(4),
                         lode_cosine_slope<D>(trial.deviator, trial.q, cosine), tangent);
+}
+
+template <int D, class N>
+void write(const Soil& soil, const Start<N>& start, const End<N>& end, const Deviators<D, N>& deviators,
+           const PointBatch<D>& points, Index i)
+{
+  const N ratio = chosen<N>(end.trial_q > 0, end.q / end.trial_q, N{});
+  write_stress<D, N>(points, i, soil.attraction - end.pressure, ratio, end.shear_modulus, deviators);
+  add_to_state<D, N>(points, i, 0, end.plastic);
+  store(start.shear + end.shear - soil.shear, points.state[1] + i);
+  store(start.growth + end.cap_growth, points.state[2] + i);
+}
+
+template <class N>
+Mask<N> is_plastic(const End<N>& end)
+{
+  return (end.plastic > 0) | (end.cap_growth > 0);
 }
 
 template <int D>
 Outcome update_point(const Soil& soil, const PointBatch<D>& points, Index i, double* tangent)
 {
-  Tensors<D> tensors;
-  const Start start = start_of<D>(soil, points, i, tensors);
-  const std::optional<Solution> solution = is_sound(start) ? solution_of(soil, start) : std::nullopt;
-  if (!solution)
+  Deviators<D, double> deviators;
+  const Start<double> start = start_of<D, double>(soil, points, i, deviators);
+  const std::optional<Solution<double>> solution = is_sound(start) ? solution_of(soil, start) : std::nullopt;
+  if (!solution || !is_sound(solution->end))
     return Outcome::failed;
-  const End<double>& end = solution->end;
-  if (!(end.pressure + end.trial_q < most_stress))
-    return Outcome::failed;
-  const double ratio = end.trial_q > 0 ? end.q / end.trial_q : 0;
-  for (std::size_t k = 0; k < n_stress<D>; ++k)
-    points.stress[k][i] = ratio * (tensors.stress[k] + 2 * end.shear_modulus * tensors.strain[k]) +
-                          (k < 3 ? soil.attraction - end.pressure : 0.0);
-  points.state[0][i] += end.plastic;
-  points.state[1][i] = start.shear + end.shear - soil.shear;
-  points.state[2][i] = std::log(start.cap / soil.cap) + end.cap_growth;
+  write<D, double>(soil, start, solution->end, deviators, points, i);
   if (tangent)
-    write_tangent<D>(soil, start, *solution, tensors, tangent);
-  return end.plastic > 0 || end.cap_growth > 0 || solution->is_loose ? Outcome::plastic : Outcome::elastic;
+    write_tangent<D>(soil, start, *solution, deviators, tangent);
+  return is_plastic(solution->end) || solution->is_loose ? Outcome::plastic : Outcome::elastic;
+}
+
+template <int D>
+std::optional<Index> update_points(const Soil& soil, const PointBatch<D>& points, Index i)
+{
+  Deviators<D, Lanes> deviators;
+  const Start<Lanes> start = start_of<D, Lanes>(soil, points, i, deviators);
+  if (any(!is_sound(start)))
+    return {};
+  const std::optional<End<Lanes>> end = ends_of(soil, start);
+  if (!end || any(!is_sound(*end)))
+    return {};
+  write<D, Lanes>(soil, start, *end, deviators, points, i);
+  return count(is_plastic(*end));
 }
 } // namespace hardening_soil
 
@@ -311,7 +362,7 @@ BatchReport update(const HardeningSoil& law, const PointBatch<D>& points)
 {
   const hardening_soil::Soil soil = hardening_soil::soil_of(law);
   return update_side_by_side(
-      points, [](Index) { return std::optional<Index>{}; },
+      points, [&](Index i) { return hardening_soil::update_points<D>(soil, points, i); },
       [&](Index i, double* tangent) { return hardening_soil::update_point<D>(soil, points, i, tangent); });
 }
 

@@ -3,7 +3,10 @@
 /// The Lode angle of a deviator, by the cosine of its threefold.
 
 #include "base/lanes.h"
+#include "materials/tools/branch_free.h"
 #include "materials/tools/deviator.h"
+
+#include <numbers>
 
 namespace mpm::materials
 {
@@ -78,6 +81,28 @@ T lode_cosine(const T& cube, const T& q)
 {
   const T largest = q * q * q, one = T{} + 1;
   return largest > 0 ? larger(smaller(cube / largest, one), -one) : one;
+}
+
+/// The series of cos(2/3 arccos(x)) about x = 1/2, by the differential equation that it satisfies as Chebyshev
+/// polynomials do; for 0 <= x <= 1 each term is a third of the one before at most.
+inline constexpr auto cosine_of_two_thirds = []
+{
+  constexpr double cosine_40 = 0.766044443118978, sine_40 = 0.6427876096865393; // of 2/3 of arccos(1/2) = 60 degrees
+  std::array<double, 32> c{cosine_40, 4 * sine_40 * std::numbers::inv_sqrt3 / 3};
+  for (std::size_t k = 0; k + 2 < c.size(); ++k)
+  {
+    const double n = static_cast<double>(k);
+    c[k + 2] = (0.5 * (n + 1) * (2 * n + 1) * c[k + 1] + (n * n - 4.0 / 9) * c[k]) / (0.75 * (n + 1) * (n + 2));
+  }
+  return c;
+}();
+
+/// cos(theta) of an angle from 0 to 60 degrees by cos(3 theta)
+template <class T>
+T third_cosine(const T& threefold)
+{
+  const T half = root<T>((1 + threefold) / 2); // cos(3 theta / 2)
+  return power_series<cosine_of_two_thirds, 0, 1, cosine_of_two_thirds.size(), T>(half - 0.5);
 }
 
 /// Derivative of cos(3 theta) by the deviator, itself a deviator; zero where there is no direction

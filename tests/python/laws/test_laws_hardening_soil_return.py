@@ -60,9 +60,18 @@ def test_increments_of_any_size_return_to_admissible_stresses(dim, soil):
         assert state == pytest.approx(state_before, abs=1e-7)
 
 
-def test_a_point_is_updated_alike_alone_and_among_others_with_and_without_tangent():
-    stress, increment = random_points(3, 50, pressure=60e3, deviator=10e3, strain=1e-3)
-    assert_alike_alone_and_among_others(sand(), stress, increment, np.zeros((50, 3)))
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_point_is_updated_alike_alone_and_among_others_with_and_without_tangent(dim):
+    # Elastic, plastic, loose and failing, new and hardened, with increments from tiny to huge ones
+    rng, law = np.random.default_rng(2), sand()
+    stress, increment = random_points(dim, 801, pressure=60e3, deviator=10e3, strain=1.0)
+    increment *= 10 ** rng.uniform(-7, -1, (801, 1))
+    increment[17, 1], stress[100, 1] = np.nan, np.inf
+    state = np.zeros((801, 3))
+    hardened = rng.uniform(size=801) < 0.5
+    state[hardened, 1:] = rng.uniform(0.0, [2e-3, 12.0], (hardened.sum(), 2))
+    report = assert_alike_alone_and_among_others(law, stress, increment, state)
+    assert report.failed == 2 and 200 < report.plastic < 780
 
 
 def test_turned_points_are_turned_results():
