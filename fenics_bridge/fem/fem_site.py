@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from fenics_bridge.fem.active_cells import cells_there, switch_off
 from fenics_bridge.fem.at_rest import rows_of, stress_at_rest, warn_beyond_strength
 from fenics_bridge.fem.load_steps import LoadStep
 from fenics_bridge.fem.loads import Load
+from fenics_bridge.fem.overconsolidation import hardened
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport
 from fenics_bridge.mesh.names import known_tags, label, tag_numbers
@@ -92,7 +93,7 @@ class FemSite:
         """
         fem = self.fem
         state, _, _ = self.state.after(stage)
-        k0 = state.k0_of(stage)
+        k0, ratios = state.k0_of(stage), state.overconsolidation_of(stage, self._laws(state))
         given = (
             stress_at_rest(fem, state, self._off(state.there), self._laws(state), k0, self.state.there) if k0 else None
         )
@@ -108,6 +109,7 @@ class FemSite:
         self.number += 1
         if not fem.converged:
             raise StageError(self._failure(stage, steps), 1.0 - fem.load.held)
+        self._harden(ratios)
         iterations = sum(step.report.iterations for step in steps)
         return StageReport(self.number, stage.name, len(steps), iterations, self.largest_displacement())
 
@@ -169,6 +171,14 @@ class FemSite:
         self.state = state
         moved = any(v for s in state.supports for v in (s.displacement or ()) if v)
         return Load({tag: state.unit_weight[tag] for tag in state.there}, state.pressure, float(moved))
+
+    def _harden(self, ratios: Mapping[int, float]) -> None:
+        """Give the points of soils the hardening of overconsolidation ratios [-], by tag, under their present stresses."""
+        points, laws = self.fem.points, self.fem.law_by_tag()
+        for tag, ratio in ratios.items():
+            rows, law = rows_of(self.fem, (tag,)), laws[tag]
+            states = points.state[rows, : law.n_state]
+            points.state[rows, : law.n_state] = hardened(law, points.stress[rows], states, ratio)
 
     def _laws(self, state: SiteState) -> Any:
         """The present laws, by tag: those of the stage, otherwise those that the body had before."""

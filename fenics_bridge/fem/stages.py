@@ -14,6 +14,7 @@ from mpm_core.members import Member
 
 from fenics_bridge.errors import InputError, agree, is_finite
 from fenics_bridge.fem.k0 import LARGEST_K0, Surface, surface_height
+from fenics_bridge.fem.overconsolidation import LARGEST, require_hardening_soil
 from fenics_bridge.fem.supports import Support
 from fenics_bridge.types import Law, OfPosition
 from mpm_core import _core
@@ -55,6 +56,9 @@ class Stage:
     k0: dict[int | str, float] = field(default_factory=dict)
     """K0 by soil of `fill`, instead of `stress`: these soils come with stresses in equilibrium under their weight, whose horizontal part is K0
     times the vertical one, both effective; in axial symmetry that along the radius and that around the axis"""
+    overconsolidation: dict[int | str, float] = field(default_factory=dict)
+    """Overconsolidation ratio by soil of `fill`, whose law is HardeningSoil: at the end of this stage the soil has the hardening of ground that
+    has been normally consolidated to so many times its vertical effective stress"""
     reset_displacement: bool = False
     """Whether displacements count from the beginning of this stage"""
     install: dict[str, Member] = field(default_factory=dict)
@@ -245,11 +249,11 @@ class SiteState:
         agree(self._comm, _wrong_value(stage, where) or _wrong_member(stage, where, self.members))
         new.law = self.law | self._by_soil(where + "law", stage.law)
         new.unit_weight = self.unit_weight | self._by_soil(where + "unit_weight", stage.unit_weight)
-        not_placed = next((key for key in stage.k0 if set(self._cells_of(key, where + "k0")).difference(fill)), None)
-        agree(
-            self._comm,
-            None if not_placed is None else f"{where}k0 is given for {not_placed!r}, expected a soil of fill",
-        )
+        for argument in ("k0", "overconsolidation"):
+            soils = getattr(stage, argument)
+            other = next((s for s in soils if set(self._cells_of(s, where + argument)).difference(fill)), None)
+            wrong = None if other is None else f"{where}{argument} is given for {other!r}, expected a soil of fill"
+            agree(self._comm, wrong)
         without = [tag for tag in new.there if tag not in new.unit_weight]
         agree(self._comm, f"{where}unit_weight: the soil {self._name_of(without[0])} has none" if without else None)
         pressure = {n: p for key, p in stage.pressure.items() for n in self._facets_of(key, where + "pressure")}
@@ -290,6 +294,21 @@ class SiteState:
         """K0 of the soils that a stage places, by their tags."""
         return self._by_soil(f"stage {stage.name!r}: k0", stage.k0)
 
+    def overconsolidation_of(self, stage: Stage, laws: Mapping[int, Law]) -> dict[int, float]:
+        """Overconsolidation ratios of the soils that a stage places, by their tags. Collective.
+
+        Args:
+            stage: the stage.
+            laws: laws by cell tag, of these soils at least.
+
+        Raises:
+            InputError: the law of a soil has no memory of it. Raised on all ranks alike.
+        """
+        where = f"stage {stage.name!r}: "
+        ratios = self._by_soil(where + "overconsolidation", stage.overconsolidation)
+        require_hardening_soil(self._comm, where, laws, ratios, self._name_of)
+        return ratios
+
     def _numbers(self, argument: str, names: Any) -> Any:
         return tuple(dict.fromkeys(n for name in names for n in self._cells_of(name, argument)))
 
@@ -310,7 +329,7 @@ def _wrong_member(stage: Stage, where: str, there: Mapping[str, Member]) -> str 
 
 def _wrong_value(stage: Stage, where: str) -> str | None:
     """Error in the values of a stage; None without an error."""
-    for name in ("unit_weight", "pressure", "law", "k0"):
+    for name in ("unit_weight", "pressure", "law", "k0", "overconsolidation"):
         if not isinstance(getattr(stage, name), dict):
             what = "boundary" if name == "pressure" else "soil"
             return f"{where}{name} is {getattr(stage, name)!r}, expected a dictionary by {what}"
@@ -328,6 +347,11 @@ def _wrong_value(stage: Stage, where: str) -> str | None:
         if not (is_finite(value) and 0 < value <= LARGEST_K0):
             return (
                 f"{where}k0 is {value!r} for {key!r}, expected a number above 0 and up to {LARGEST_K0:g}, such as 0.5"
+            )
+    for key, value in stage.overconsolidation.items():
+        if not (is_finite(value) and 1 <= value <= LARGEST):
+            return (
+                f"{where}overconsolidation is {value!r} for {key!r}, expected a ratio from 1 to {LARGEST:g}, such as 2"
             )
     if stage.k0 and stage.stress is not None:
         return f"{where}stress and k0 are given, expected one of them"

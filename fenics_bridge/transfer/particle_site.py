@@ -12,6 +12,7 @@ import mpm_core as mpm
 from fenics_bridge.errors import InputError, agree, real_numbers
 from fenics_bridge.fem.at_rest import warn_beyond_strength
 from fenics_bridge.fem.fem_site import FemSite
+from fenics_bridge.fem.overconsolidation import hardened
 from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport
 from fenics_bridge.fem.supports import Support, not_supports
 from fenics_bridge.transfer.handover import Handover, initialise
@@ -106,6 +107,7 @@ class ParticleSite:
         self._refuse_resting(state, stage)
         self._refuse_occupied(fill, stage)
         k0, laws = state.k0_of(stage), {tag: model.laws[material[tag]] for tag in state.there}
+        ratios = state.overconsolidation_of(stage, laws)
         at_rest = (
             stress_at_rest(self, state, laws, k0, gravity=self._g, per_cell=self._per_cell, **self._options)
             if k0
@@ -130,6 +132,7 @@ class ParticleSite:
             report = model.equilibrate(**self._options)
         except mpm.RunError as error:
             raise StageError(self._failure(stage, error), float(getattr(error, "applied", 0.0))) from error
+        self._harden(ratios)
         p = model.particles
         moved = np.linalg.norm(p.displacement, axis=1).max(initial=0.0)
         return StageReport(
@@ -233,6 +236,16 @@ class ParticleSite:
             model.assign(numbers)
             model.particles.set("state", state)
             model._seeded(0, 0)  # gives laws that ask for it the size of the cells
+
+    def _harden(self, ratios: Mapping[int, float]) -> None:
+        """Give the particles of soils the hardening of overconsolidation ratios [-], by tag, under their present stresses."""
+        p, laws = self.model.particles, self.model.laws
+        states = p.state.copy()
+        for tag, ratio in ratios.items():
+            rows, law = self.rows_of(tag), laws[self._material[tag]]
+            states[rows, : law.n_state] = hardened(law, p.stress[rows], states[rows, : law.n_state], ratio)
+        if ratios:
+            p.set("state", states)
 
     def _weigh(self, state: SiteState) -> None:
         """Scale masses by the ratio of the new unit weights to the old ones; undeformed volumes are not stored."""

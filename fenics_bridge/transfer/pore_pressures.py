@@ -13,11 +13,10 @@ import mpm_core as mpm
 from fenics_bridge import compat
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.evaluate import PointSearch
+from fenics_bridge.fem.overconsolidation import EXCESS
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.mesh.names import tag_numbers
 from fenics_bridge.transfer.moved import cell_gradient
-
-EXCESS = "excess_pore_pressure"
 
 
 def skeleton_of(law: Any) -> Any:

@@ -1,0 +1,88 @@
+"""Soil that has carried more than its present stress: the hardening of an overconsolidation ratio, for soils that a stage places."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from mpm_core.law_warnings import with_inner_laws
+from numpy.typing import NDArray
+
+import mpm_core as mpm
+from fenics_bridge.errors import agree
+from fenics_bridge.types import Law
+
+LARGEST = 100.0
+"""Overconsolidation ratio above which it is one in percent, or a stress: desiccated crusts reach some 50"""
+
+EXCESS = "excess_pore_pressure"
+"""State variable of laws whose stress is the total one"""
+
+
+def hardening_soil_in(law: Law) -> mpm.HardeningSoil | None:
+    """The HardeningSoil that a law is, or that `Undrained` and `Hencky` are made of; None of others, and where its parameters vary."""
+    each = list(with_inner_laws(law))
+    varies = any(isinstance(one, mpm.Heterogeneous) for one in each)
+    return each[-1] if isinstance(each[-1], mpm.HardeningSoil) and not varies else None
+
+
+def require_hardening_soil(
+    comm: MPI.Comm, where: str, laws: Mapping[int, Law], ratios: Mapping[int, float], name_of: Any
+) -> None:
+    """Require laws that an overconsolidation ratio has an effect on. Collective.
+
+    Args:
+        comm: the ranks.
+        where: stage, for messages.
+        laws: by cell tag.
+        ratios: overconsolidation ratios [-], by cell tag.
+        name_of: function of a tag that gives the name of its soil.
+
+    Raises:
+        InputError: the law of a soil is another one. Raised on all ranks alike.
+    """
+    problems = (
+        f"{where}overconsolidation is {ratio:g} for the soil {name_of(tag)}, whose law is {laws[tag].name}, expected HardeningSoil with the same "
+        "parameters at all points"
+        for tag, ratio in ratios.items()
+        if hardening_soil_in(laws[tag]) is None
+    )
+    agree(comm, next(problems, None))
+
+
+def hardened(law: Law, stress: NDArray[np.float64], state: NDArray[np.float64], ratio: float) -> NDArray[np.float64]:
+    """The states of points of Hardening Soil after a larger vertical stress than the present one.
+
+    Hardening is at least that of level ground which has been normally consolidated to the vertical effective stress times the ratio, and that
+    which the stress itself needs.
+
+    Args:
+        law: HardeningSoil, or what is made of it.
+        stress: present stress [Pa], tension positive, shape (n, S); the last axis of the space points up.
+        state: state variables, shape (n, n_state).
+        ratio: largest vertical effective stress before over the present one, OCR [-].
+
+    Returns:
+        State variables, shape (n, n_state).
+    """
+    soil, names, result = hardening_soil_in(law), law.state_names, state.copy()
+    effective = stress.copy()
+    if EXCESS in names:
+        effective[:, :3] += state[:, names.index(EXCESS), None]
+    up = 1 if stress.shape[1] == 4 else 2
+    level = np.zeros_like(stress)  # its largest principal stress is the vertical one, whatever K0 of the ground
+    level[:, :3] = normal_k0(soil) * np.minimum(effective[:, up], 0.0)[:, None]
+    level[:, up] = np.minimum(effective[:, up], 0.0)
+    for found in (mpm.hardening_soil_state(soil, level, ratio), mpm.hardening_soil_state(soil, effective)):
+        for name, values in found.items():
+            column = names.index(name)
+            result[:, column] = np.maximum(result[:, column], values)
+    return result
+
+
+def normal_k0(law: Any) -> float:
+    """K0 of normally consolidated soil of a HardeningSoil [-]."""
+    return float(law.normal_k0) or 1 - math.sin(math.radians(law.friction_angle))
