@@ -47,7 +47,7 @@ def parser() -> ArgumentParser:
         p,
         "--compare",
         True,
-        "also compute elastic soil, and the final geometry in one stage, for comparison; without members and k0",
+        "also compute elastic soil, and the final geometry in one stage, for comparison; without members, k0 and overconsolidation",
     )
     return p
 
@@ -102,7 +102,11 @@ def main(arguments: list[str] | None = None) -> int:
     site = read_site(a.site, comm, a.cell_size, needed=("stages",))
     folder = open_results(a, comm)
     run = carry_out(site, int(a.elements[1]), folder, comm)
-    compared = comparison(site, run.site) if a.compare and run.stopped is None and not (site.members or site.k0) else {}
+    compared = (
+        comparison(site, run.site)
+        if a.compare and run.stopped is None and not (site.members or site.begins_at_rest)
+        else {}
+    )
     last = run.rows[-1] if run.rows else {}
     summary = {
         "finished_run": run.stopped is None, "stopped_because": run.stopped,

@@ -224,13 +224,13 @@ def site_load(site: Site, model: bridge.QuasiStatic) -> bridge.Load:
 
     They are placed at once, since the factor hardly depends on stresses before failure. But soil with friction whose water does not
     drain has the strength of its effective stress when it ceases to drain: stages in which that happens are carried out, as are those of
-    a site with K0.
+    a site with K0 or overconsolidation.
 
     Raises:
         RunError: a stage that is carried out has no equilibrium.
     """
     undrains = any(keeps_effective_stress(law) for stage in site.stages for law in stage.law.values())
-    if not (undrains or site.k0):
+    if not (undrains or site.begins_at_rest):
         return bridge.FemSite(model).place(site.stages) if site.stages else site.load()
     try:
         if site.stages:
@@ -301,7 +301,7 @@ def main(arguments: list[str] | None = None) -> int:
 
         def more(site):
             if a.particles:
-                say_left_out(site.k0, "particles")
+                say_left_out(site.k0, site.overconsolidation, "particles")
             found = particle_summary(site_by_particles(a, site)) if a.particles else {}
             if a.critical_seismic:
                 model = site.finite_elements(**finite_elements(a))

@@ -170,9 +170,10 @@ class ConsolidationSite:
     def _carry_weight(self, fem: bridge.QuasiStatic, pressure: Any) -> None:
         """Bring new elements to the equilibrium of the beginning; pressure: of the water, a function of positions [Pa]. Collective."""
         there, load = [soil for soil in self.soils if soil not in self.stages[0].off], self.load(0.0)
-        k0 = {soil: value for soil, value in self.site.k0.items() if soil in there}
+        k0, ratios = ({soil: value for soil, value in given.items() if soil in there}
+                      for given in (self.site.k0, self.site.overconsolidation))  # fmt: skip
         stage = bridge.Stage("beginning", there, unit_weight=self.site.unit_weight, pressure=load.pressure, k0=k0,
-                             pore_pressure=pressure, install=dict(self.stages[0].members))  # fmt: skip
+                             overconsolidation=ratios, pore_pressure=pressure, install=dict(self.stages[0].members))  # fmt: skip
         try:
             bridge.FemSite(fem).carry_out(stage)
         except bridge.StageError as error:

@@ -8,7 +8,8 @@ Example of a file:
 
     [soils.clay]                       # a physical group of the mesh
     unit_weight = 17e3                 # N/m3
-    k0 = 0.8                           # horizontal over vertical effective stress of soil that is there from the beginning
+    k0 = 0.8                           # horizontal over vertical effective stress of soil that is there from the beginning; with
+                                       # material = "hardening-soil" also overconsolidation = 2
     material = "tresca"                # and the parameters of the law, named as the options of the study slope
     young = 3e6
     cohesion = {value = 12e3, per_metre = 1.5e3, top = 3.0}    # grows with depth below the height `top`;
@@ -43,12 +44,23 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 from .checks import say
+from .hardening_doubts import k0_doubt, secant_doubt
 from .site_doubts import warn_of_depth, warn_of_pressures, warn_of_water
 from .site_fields import SoilField, fields_of, values_of, varying
 from .site_interfaces import fractions_of, in_stages, split_beside, weakened
-from .site_k0 import k0_of, with_k0
+from .site_k0 import from_the_beginning, k0_of, overconsolidation_of
 from .site_keys import CHANGES, STAGE_WATER, changes_of, member_of, part_of, read_site_table, require_push
-from .site_laws import idle_doubt, is_number, law_at, law_keys, left_out_doubt, located, unit_doubt, unit_weight_of
+from .site_laws import (
+    OVERCONSOLIDATION,
+    idle_doubt,
+    is_number,
+    law_at,
+    law_keys,
+    left_out_doubt,
+    located,
+    unit_doubt,
+    unit_weight_of,
+)
 from .site_mesh import check_soils, geometry_of, site_mesh
 from .site_supports import support_of, supports_of
 from .slope_case import GRAVITY
@@ -63,6 +75,7 @@ class Site:
     laws: by cell tag; unit_weight: by soil [N/m3]; supports: of `fenics_bridge`; stages: as for `carry_out`
     further_laws: those that come in by stages; members: structural ones by name, of stages; axisymmetric: whether it is a half section; stage_rows: stages as in the file
     random: parameters of soils that are random fields; k0: ratio of horizontal to vertical effective stress by soil, of those that have one
+    overconsolidation: largest vertical effective stress before over that of the beginning by soil, of those that have one
     """
 
     domain: Any
@@ -79,6 +92,12 @@ class Site:
     members: dict[str, mpm.Member] = field(default_factory=dict)
     random: Sequence[SoilField] = ()
     k0: dict[str, float] = field(default_factory=dict)
+    overconsolidation: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def begins_at_rest(self) -> bool:
+        """Whether it matters with which stresses its soils are there from the beginning."""
+        return bool(self.k0 or self.overconsolidation)
 
     @property
     def geometry(self) -> mpm.Geometry | None:
@@ -89,7 +108,7 @@ class Site:
         """Elements of all soils, with a law for each tag; options: further ones of `QuasiStatic`. Collective.
 
         Linear elements average volumetric strains where a soil of the site keeps its volume, unless `nmd` says otherwise. Without
-        stages all structural members are there, with K0 from `begin_at_rest` on.
+        stages all structural members are there, in a site that begins at rest from `begin_at_rest` on.
         """
         options.setdefault("nmd", degree == 1 and keeps_volume([*self.laws.values(), *self.further_laws]))
         body, cell_tags, facet_tags = self.body()
@@ -104,7 +123,7 @@ class Site:
             **options,
         )
         self.vary(fem, laws or self.laws)
-        if self.members and not self.stages and not self.k0:
+        if self.members and not self.stages and not self.begins_at_rest:
             fem.reconfigure(members=self.members)
         return fem
 
@@ -221,6 +240,7 @@ def site_of(
     domain, cell_tags, facet_tags = site_mesh(table, path, comm, cell_size)
     check_soils(table, path, cell_tags)
     soils, laws, weights = table["soils"], {}, {}
+    k0, ratios = k0_of(soils, path), overconsolidation_of(soils, path)
     random: list[SoilField] = []
     for soil, given in soils.items():
         where = f"{path}: soils.{soil}"
@@ -235,13 +255,17 @@ def site_of(
             cell_tags, heights = bridge.graded_tags(
                 domain, cell_tags, soil, lambda x: x[:, -1], table.get("classes", 20)
             )
-            laws |= {tag: varying(law_at(parameters, height, where), fields) for tag, height in heights.items()}
+            own = {tag: varying(law_at(parameters, height, where), fields) for tag, height in heights.items()}
         else:
             law = varying(law_at(parameters, None, where), fields)
-            laws |= dict.fromkeys(bridge.names_of(cell_tags).get(soil, (soil,)), law)
+            own = dict.fromkeys(bridge.names_of(cell_tags).get(soil, (soil,)), law)
+        laws |= own
         say(unit_doubt(parameters, where, heights.values()))
-        say(idle_doubt(part_of(given, law_keys()), where))
+        say(idle_doubt(part_of(given, (*law_keys(), OVERCONSOLIDATION)), where))
         say(left_out_doubt(parameters, where))
+        one = next(iter(own.values()))
+        say(secant_doubt(one, where))
+        say("" if soil in k0 else k0_doubt(one, ratios.get(soil, 1.0), where))
     others = {
         name: law_at(located(given, path.parent), None, f"{path}: laws.{name}")
         for name, given in table.get("laws", {}).items()
@@ -249,6 +273,7 @@ def site_of(
     for name, given in table.get("laws", {}).items():
         for doubt in (unit_doubt, idle_doubt, left_out_doubt):
             say(doubt(given, f"{path}: laws.{name}"))
+        say(secant_doubt(others[name], f"{path}: laws.{name}"))
     members = {name: member_of(given, f"{path}: members.{name}") for name, given in table.get("members", {}).items()}
     _require_columns(members, path)
     rows, names = table.get("stages", []), {} if interfaces is False else fractions_of(table.get("members", {}), path)
@@ -256,7 +281,7 @@ def site_of(
     at_once = interfaces or (interfaces is None and not rows)
     laws = weakened(laws, beside, at_once)
     site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, supports_of(table, path, domain, facet_tags), [],
-                list(others.values()), axisymmetric, rows, members, random, k0_of(soils, path))  # fmt: skip
+                list(others.values()), axisymmetric, rows, members, random, k0, ratios)  # fmt: skip
     site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(rows)]
     if beside.walls and not at_once:
         site.stages, further = in_stages(site.stages, laws, beside, lambda soil: site.tags_of([soil]))
@@ -277,7 +302,7 @@ def site_of(
         say(
             f"{path}: no stage fills the cells of {names}, which therefore hold no soil; name it in fill of a stage where it is there"
         )
-    site.stages = with_k0(site.stages, site.k0, begins_later or not rows or "day" not in rows[0], path)
+    site.stages = from_the_beginning(site.stages, site, begins_later or not rows or "day" not in rows[0], path)
     return site
 
 

@@ -12,7 +12,7 @@ from fenics_bridge import water
 
 from .parameters import unknown_key
 from .site_k0 import KEY as K0
-from .site_laws import give_way, is_number, law_keys, leave_out_idle, located
+from .site_laws import OVERCONSOLIDATION, give_way, is_number, law_keys, leave_out_idle, located
 from .site_tables import MOST_FILES, merged, parsed
 
 DAY = 86400.0
@@ -104,7 +104,11 @@ def _extended(path: Path, files: list[dict[str, Any]]) -> dict[str, Any]:
     table = parsed(path)
     files.append(table)
     _require_known(table, KEYS, str(path))
-    for key, known in (("soils", (*FLOW, "unit_weight", K0, *law_keys())), ("laws", law_keys()), ("boundaries", WATER)):
+    for key, known in (
+        ("soils", (*FLOW, "unit_weight", K0, OVERCONSOLIDATION, *law_keys())),
+        ("laws", law_keys()),
+        ("boundaries", WATER),
+    ):
         for name, given in _table_at(table, key, str(path)).items():
             _require_known(given, known, f"{path}: {key}.{name}")
     if "extends" not in table:

@@ -23,6 +23,8 @@ STRENGTHS = ("cohesion", "shear_strength")
 """Parameters of which a law has one; in a site that extends another, one of them takes the place of the other"""
 KINDS = ("material", "python_law", "umat")
 """Keys that say which law it is; the last one that a table has does"""
+OVERCONSOLIDATION = "overconsolidation"
+"""Key of a soil whose law remembers the largest stress that it has carried"""
 OF_UMAT = ("properties", "strength_properties", "variables")
 
 
@@ -99,6 +101,7 @@ def without_effect(table: Mapping[str, Any]) -> list[str]:
     idle = idle - {"young", "poisson"} if kind == "umat" else idle | set(OF_UMAT)
     idle |= set(KINDS) - {kind} if kind in KINDS else set()
     idle |= set() if table.get("undrained", False) else {"water_modulus"}
+    idle |= set() if kind == "hardening-soil" else {OVERCONSOLIDATION}
     return [key for key in table if key in idle]
 
 

@@ -70,7 +70,7 @@ def site_study(
         name: of the value in the summary; label: of its axis, with unit.
         more: function of the site on the finest mesh that returns further entries of the summary.
         at_once: whether anything of it has all soils at once, without what stages change, so that a warning is due.
-        at_rest: whether the value is found from the stresses by K0; else a warning is due.
+        at_rest: whether the value is found from the stresses by K0 and overconsolidation; else a warning is due.
     """
     comm, start = MPI.COMM_WORLD, perf_counter()
     finest = a.cell_size or cell_size_of(a.site)
@@ -78,10 +78,10 @@ def site_study(
     site, runs = read_site(a.site, comm, sizes[0]), []
     folder = open_results(a, comm)
     if not at_rest:
-        say_left_out(site.k0, str(a.site))
+        say_left_out(site.k0, site.overconsolidation, str(a.site))
     for size in sizes:
         site = site if size == sizes[0] else read_site(a.site, comm, size)
-        site = site if at_rest else replace(site, k0={})
+        site = site if at_rest else replace(site, k0={}, overconsolidation={})
         cells = "site" if size is None else f"cells of {size:g} m"
         progress = step_line(cells, label[0].lower() + label[1:])
         model = site.finite_elements(**finite_elements(a))

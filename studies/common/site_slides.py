@@ -168,7 +168,7 @@ def slide_pictures(a: Namespace, result: Slide, scene: Scene | None, folder: Pat
 
 def _carry_weight(site: Site, fem: bridge.QuasiStatic, path: Path) -> None:
     """Bring the elements of a site to equilibrium under the weight of all soils; path: of its file, for the error. Collective."""
-    if site.k0:
+    if site.begins_at_rest:
         try:
             return begin_at_rest(site, fem)
         except bridge.StageError as error:

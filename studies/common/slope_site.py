@@ -25,7 +25,7 @@ from .checks import say
 from .site_doubts import warn_of_flooded_ground, warn_of_members, warn_of_pressures, warn_of_reservoirs
 from .site_file import Site, site_of
 from .site_flow import boundary_of, wet_soils
-from .site_k0 import k0_of, say_left_out
+from .site_k0 import k0_of, overconsolidation_of, say_left_out
 from .site_keys import CHANGES, changes_of
 from .water_site import corners_of, effective_laws, read_water_table, standing_load, times_of
 
@@ -131,7 +131,7 @@ def read_slope_site(path: Path, comm: MPI.Comm, cell_size: float | None = None, 
         say(f"{path}: all soils are there at once, and this study leaves out {changes}")
     warn_of_pressures(table, path)
     warn_of_members(table, path)
-    say_left_out(k0_of(table["soils"], path), str(path))
+    say_left_out(k0_of(table["soils"], path), overconsolidation_of(table["soils"], path), str(path))
     boundary = [_slower(one, slower) for one in boundary_of(table, path).values()]
     site = site_of(effective_laws(table), path, comm, cell_size, interfaces=False)
     body = site.body()

@@ -6,12 +6,14 @@ import argparse
 import importlib.util
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import mpm_core as mpm
 
-from .checks import check_effect
+from .checks import check_effect, say
+from .hardening_doubts import secant_doubt
 from .options import add_choice, add_code, add_number, add_switch
 from .parameters import did_you_mean
 
@@ -145,6 +147,9 @@ def check_law_options(parser: argparse.ArgumentParser, options: argparse.Namespa
         check_effect(parser, options, options.material in materials, names, f"--material {' or '.join(materials)}")
     umat = ("--properties", "--strength-properties", "--variables")
     check_effect(parser, options, options.umat is not None, umat, "--umat")
+    if options.material == "hardening-soil" and not own:
+        with suppress(mpm.InputError):  # said where the law is made
+            say(secant_doubt(law_of(options), "--material hardening-soil"))
 
 
 def law_of(args: argparse.Namespace) -> Any:
