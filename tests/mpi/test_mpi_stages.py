@@ -117,3 +117,38 @@ def test_stresses_by_k0_are_the_same_on_all_numbers_of_ranks(folder):
         )
     for together, alone in zip(*values):
         assert np.abs(together - alone).max() < 1e-8 * np.abs(alone).max()
+
+
+def test_overconsolidation_is_the_same_on_all_numbers_of_ranks(folder):
+    """Of finite elements and particles, and what they do as soil is dug away; a law without memory is an error on all ranks."""
+    apart = folder / f"rank {COMM.rank}"
+    apart.mkdir()
+    soil = mpm.HardeningSoil(
+        secant_modulus=20e6, oedometer_modulus=20e6, unloading_modulus=60e6, cohesion=5e3, friction_angle=30.0
+    )
+    laws = dict.fromkeys(SOILS["pit"], soil)
+    stages = [
+        bridge.Stage("in situ", fill=SOILS["pit"], unit_weight=weights(SOILS["pit"]), k0=dict.fromkeys(SOILS["pit"], 0.8),
+                     overconsolidation={"ground": 3.0, "pit 2": 1.5}, pore_pressure=bridge.hydrostatic(2.0)),
+        bridge.Stage("dig", excavate="pit 1"),
+    ]  # fmt: skip
+    values = []
+    for place, comm in ((folder, COMM), (apart, MPI.COMM_SELF)):
+        mesh = mesh_of("pit", place, comm)
+        fem = site_of(mesh, laws, degree=2)
+        model = mpm.Model(bridge.background_mesh(*mesh), [soil])
+        particles = bridge.ParticleSite(
+            model, dict.fromkeys(laws, 0), ROLLERS, tolerance=1e-8, small_displacements=True
+        )
+        for site in (fem, particles):
+            list(bridge.carry_out(site, stages))
+        p = model.particles
+        rows = [pair for ids, state in comm.allgather((p.id, p.state)) for pair in zip(ids.tolist(), state)]
+        found = fem.fem.evaluate_at(POINTS)
+        values.append((found["state"], found["stress"], np.array([row for _, row in sorted(rows, key=lambda r: r[0])])))
+    for together, alone in zip(*values):
+        assert np.abs(together - alone).max() < 1e-7 * np.abs(alone).max()
+    site = site_of(mesh_of("pit", folder), plastic(SOILS["pit"]), degree=1)
+    with pytest.raises(bridge.InputError, match="'ground', whose law is MohrCoulomb, expected HardeningSoil") as error:
+        site.carry_out(stages[0])
+    assert len(set(COMM.allgather(str(error.value)))) == 1
