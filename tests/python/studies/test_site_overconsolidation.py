@@ -240,16 +240,7 @@ def test_moduli_that_make_soil_softer_than_its_secant_modulus_are_doubted(tmp_pa
     path = site_in(tmp_path, SITE.replace("oedometer_modulus = 20e6", "oedometer_modulus = 8e6", 1) + STAGES)
     with pytest.warns(RuntimeWarning, match="soils.clay: secant_modulus is 2e[+]07 Pa, but a drained triaxial test"):
         read_site(path, COMM)
-    options = [
-        "--material",
-        "hardening-soil",
-        "--oedometer-modulus",
-        12e6,
-        "--steps",
-        10,
-        "--pressure",
-        100e3,
-    ]
+    options = ["--material", "hardening-soil", "--oedometer-modulus", 12e6, "--steps", 10, "--pressure", 100e3]
     with pytest.warns(RuntimeWarning, match="--material hardening-soil: secant_modulus is 3e[+]07 Pa, but a drained"):
         study_main.main("element_test", [*options, "--output", tmp_path / "out"])
 
