@@ -105,7 +105,7 @@ def slope_factor(length, angle, unit_weight, seeps, degree):
 
 def slope_checks(quick):
     angle, checks = np.radians(20.0), []
-    lengths = (15.0, 30.0) if quick else (20.0, 40.0)
+    lengths = (10.0, 20.0) if quick else (20.0, 40.0)
     for name, unit_weight, seeps in (("dry", 18e3, False), ("seepage parallel to it", 20e3, True)):
         normal = (unit_weight - WATER * seeps) * np.cos(angle) ** 2
         exact = (1e3 + normal * np.tan(np.radians(30.0))) / (unit_weight * np.sin(angle) * np.cos(angle))
