@@ -27,7 +27,7 @@ def keep(name, *arrays):
         found[f"{name}{k}"] = np.concatenate([part.ravel() for part in parts])
 
 soil = mpm.MohrCoulomb(young=200e3, poisson=0.33, cohesion=1e3, friction_angle=25.0)
-parts = bridge.slope_mesh(comm, cell_size=0.1)
+parts = bridge.slope_mesh(comm, cell_size=0.2)
 model = mpm.Model(bridge.background_mesh(*parts), soil)
 keep("BITS mesh", model.mesh.points, model.mesh.cells, model.mesh.global_cells)
 model.seed(density=18e3 / 9.81, per_cell=3, cell_tag=bridge.SOIL)
