@@ -160,23 +160,35 @@ def frame_at(model: mpm.Model, time: float) -> dict | None:
     return gathered(model.comm, {**frame, "resting": p.is_resting.astype(np.float32), "corners": corners})
 
 
-def newmark(a: Namespace, history: History) -> tuple[float, dict[str, np.ndarray]]:
-    """Yield acceleration [m/s2] of the slope, and slips over time [m] of blocks that move with the free field behind the crest.
+def yield_of(a: Namespace) -> float:
+    """Yield acceleration of the slope [m/s2].
 
-    At the toe's level that is the ground below the slip, for a mass that moves as one; at the crest's level it has the
-    amplification of soil as high as the slope.
+    Raises:
+        InputError: the slope does not stand without an earthquake.
     """
-    soil = laws_of(a)[bridge.SOIL]
-    strength = bridge.davis_strength(soil)
+    strength = bridge.davis_strength(laws_of(a)[bridge.SOIL])
     begins = yield_acceleration(
         a.height, a.angle, strength.cohesion, strength.friction_angle, a.unit_weight, GRAVITY, a.soil_depth
     )
     if begins <= 0:
-        raise mpm.InputError(f"--height is {a.height:g} m, expected a slope that is stable without an earthquake")
+        raise mpm.InputError(
+            f"--cohesion is {a.cohesion:g} Pa and --friction-angle {a.friction_angle:g} degrees, of which limit analysis finds a factor "
+            f"of safety of {static_safety(a):.2f} without an earthquake; expected a slope that is stable then"
+        )
+    return begins
+
+
+def newmark(begins: float, history: History) -> dict[str, np.ndarray]:
+    """Slips over time [m] of blocks that move with the free field behind the crest.
+
+    At the toe's level that is the ground below the slip, for a mass that moves as one; at the crest's level it has the
+    amplification of soil as high as the slope.
+
+    Args:
+        begins: yield acceleration of the slope [m/s2].
+    """
     motions = {"toe": "foot_velocity_m_per_s", "crest": "crest_level_velocity_m_per_s"}
-    return begins, {
-        level: sliding_block(history["time_s"], history[column], begins)[1] for level, column in motions.items()
-    }
+    return {level: sliding_block(history["time_s"], history[column], begins)[1] for level, column in motions.items()}
 
 
 def static_safety(a: Namespace) -> float:
@@ -251,11 +263,11 @@ def slope_slip(history: History) -> np.ndarray:
 
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
-    record = outcrop_motion(a)
+    begins, record = yield_of(a), outcrop_motion(a)
     folder = open_results(a, comm)
     model = model_in_equilibrium(a, record[2])
     history, frames, report = shaken(a, model, record[2], folder)
-    begins, slips = newmark(a, history)
+    slips = newmark(begins, history)
     exact, found = ratios = amplified(a, record[2], history)
     linear = found["linear column of resting cells"][1]
     summary = {

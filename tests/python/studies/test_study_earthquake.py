@@ -225,3 +225,15 @@ def test_a_ricker_wavelet_needs_no_baseline_correction():
     assert abs(displacement[-1]) < 1e-6 * largest
     assert np.abs(displacement).max() == pytest.approx(largest, rel=1e-3)
     assert np.abs(accelerations(motion.time, motion.velocity)[1]).max() == pytest.approx(peak, rel=0.01)
+
+
+def test_a_slope_that_does_not_stand_is_refused_before_the_earthquake_is_computed(tmp_path):
+    """Finite elements on coarse cells carry it, so that its run went to the end, and then had no yield acceleration and no results."""
+    result = ended("earthquake", tmp_path / "out", *"--height 6 --angle 40 --cohesion 4.5e3 --friction-angle 24".split(),
+                   *"--unit-weight 18e3 --soil-depth 4".split())  # fmt: skip
+    assert result.returncode != 0 and not (tmp_path / "out").exists()
+    angle = np.radians(24.0)  # Davis (1968) without dilation: c cos(phi), and a tangent of sin(phi)
+    reduced = 4.5e3 * np.cos(angle), np.degrees(np.arctan(np.sin(angle)))
+    factor = bridge.log_spiral_safety(6.0, 40.0, *reduced, 18e3, depth=4.0)
+    assert 0.95 < factor < 1
+    assert f"--cohesion is 4500 Pa and --friction-angle 24 degrees, of which limit analysis finds a factor of safety of {factor:.2f}" in result.stderr  # fmt: skip
