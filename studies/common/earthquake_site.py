@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from dolfinx.mesh import meshtags
@@ -26,6 +27,10 @@ STIFF = 3
 """Cell tag of the lower layer"""
 LARGEST_RECORDED = 25.0
 """Acceleration of rock [m/s2] above which a motion is a mistake in its unit"""
+STRONG = 1.0
+"""Largest acceleration [m/s2] below which a record whose unit is not named is more probably one in g"""
+GAP = 5.0
+"""Time between two values of a record, over the usual one, from which on values are missing"""
 FIELDS = ("displacement", "velocity", "stress", "plastic_strain", "volume", "resting")
 """Of particles and resting cells in the files for ParaView"""
 
@@ -47,6 +52,16 @@ def outcrop_motion(a: Namespace) -> tuple[np.ndarray, np.ndarray, mpm.Motion]:
     return time, acceleration, as_motion(time, acceleration)
 
 
+def doubt_record(path: Path, time: np.ndarray, acceleration: np.ndarray, unit_named: bool) -> None:
+    """Warn of a gap in a record [s, m/s2], and of a weak one whose unit is not named."""
+    largest, steps = float(np.abs(acceleration).max()), np.diff(time)
+    say(f"the largest acceleration of --accelerogram {path} is {largest:.3g} m/s2, as its values are taken in m/s2 without --unit; name "
+        "their unit" if largest < STRONG and not unit_named else "")  # fmt: skip
+    longest, usual = int(steps.argmax()), float(np.median(steps))
+    say(f"--accelerogram {path} has no values from {time[longest]:.6g} to {time[longest + 1]:.6g} s, between steps of {usual:.3g} s: its "
+        "acceleration is taken as linear there" if steps[longest] > GAP * usual else "")  # fmt: skip
+
+
 def recorded(a: Namespace) -> tuple[np.ndarray, np.ndarray]:
     """Times from the first on [s] and accelerations [m/s2] in the file of ``--accelerogram``.
 
@@ -56,10 +71,11 @@ def recorded(a: Namespace) -> tuple[np.ndarray, np.ndarray]:
     if not any(line.split("#")[0].strip() for line in path.read_text(errors="replace").splitlines()):
         raise mpm.InputError(f"--accelerogram {path} is empty")
     try:
-        unit = a.unit if a.unit is not None or says_its_unit(path) else "m/s2"
-        time, acceleration = mpm.read_acceleration(path, unit=unit)
+        unit_named = a.unit is not None or says_its_unit(path)
+        time, acceleration = mpm.read_acceleration(path, unit=a.unit if unit_named else "m/s2")
     except mpm.InputError as error:
         raise mpm.InputError(f"--accelerogram: {error}") from None
+    doubt_record(path, time, acceleration, unit_named)
     return time - time[0], acceleration
 
 

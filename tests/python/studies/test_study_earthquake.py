@@ -2,6 +2,7 @@
 
 import json
 import sys
+import warnings
 from argparse import Namespace
 from pathlib import Path
 
@@ -139,7 +140,7 @@ def test_a_recorded_motion_keeps_its_high_frequencies(tmp_path):
 
 
 def test_a_record_without_unit_is_in_that_of_its_file_or_in_si(tmp_path):
-    values = np.sin(np.arange(40.0))
+    values = 2 * np.sin(np.arange(40.0))
     np.savetxt(tmp_path / "record.txt", np.column_stack([0.01 * np.arange(40), values]))
     rows = "\n".join(f"{value:.7E}" for value in values)
     (tmp_path / "record.AT2").write_text(
@@ -149,6 +150,31 @@ def test_a_record_without_unit_is_in_that_of_its_file_or_in_si(tmp_path):
         time, found, _ = outcrop_motion(Namespace(accelerogram=tmp_path / name, unit=None))
         np.testing.assert_allclose(found, factor * values, rtol=1e-6)
         np.testing.assert_allclose(time, 0.01 * np.arange(40), atol=1e-12)
+
+
+def warnings_of(path, unit, time, acceleration):
+    """What is said of a record with these columns."""
+    np.savetxt(path, np.column_stack([time, acceleration]), fmt="%.9g")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        outcrop_motion(Namespace(accelerogram=path, unit=unit))
+    return [str(one.message) for one in said]
+
+
+def test_a_record_with_a_gap_or_without_its_unit_is_doubted(tmp_path):
+    """Both were computed without a word: a motion that is linear over a second, and one of a tenth of the acceleration."""
+    path, time = tmp_path / "record.txt", 0.01 * np.arange(1001)
+    acceleration = 0.25 * np.sin(3 * np.pi * time) * np.sin(0.1 * np.pi * time) ** 2
+    assert warnings_of(path, "g", time, acceleration) == []
+    assert warnings_of(path, "m/s2", time, acceleration) == []
+    assert warnings_of(path, None, time, 9.81 * acceleration) == []
+    kept = (time < 2.995) | (time > 4.195)
+    (gap,) = warnings_of(path, "g", time[kept], acceleration[kept])
+    assert f"--accelerogram {path} has no values from 2.99 to 4.2 s, between steps of 0.01 s" in gap
+    (unit,) = warnings_of(path, None, time, acceleration)
+    assert f"{path} is {np.abs(acceleration).max():.3g} m/s2, as its values are taken in m/s2 without --unit" in unit
+    uneven = np.cumsum(np.tile([0.01, 0.03], 250))  # as digitised by hand
+    assert warnings_of(path, "g", uneven, np.interp(uneven, time, acceleration)) == []
 
 
 @pytest.mark.parametrize("first", [-20.0, 100.0])
