@@ -56,6 +56,8 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 comm = MPI.COMM_WORLD
+AT_REST = 1e-3
+"""Part of the largest velocity with which a column is at rest: the spectrum of one that still vibrates lacks what follows"""
 COLUMNS = [
     "time_s", "crest_velocity_m_per_s", "crest_level_velocity_m_per_s", "toe_level_velocity_m_per_s",
     "foot_velocity_m_per_s", "slope_displacement_m", "free_field_displacement_m",
@@ -214,7 +216,7 @@ def amplified(a: Namespace, motion: mpm.Motion, history: History) -> tuple[tuple
         return spectral_ratio(time, velocity, outcrop, band, smoothing)
 
     wavelet = mpm.motion_of_acceleration(*ricker(band[1], 0.1, 3.0 / band[0], STEP / 5))  # energy at all frequencies
-    time, velocity = linear_column(a, wavelet, 5.0 / band[0])
+    time, velocity = linear_column(a, wavelet, 5.0 / band[0], AT_REST)
     frequency, linear = ratio(time, velocity, wavelet, 0.0)
     exact = abs(amplification(frequency, layers, rock_impedances(a)[1], damping_of(a)))
     time = history["time_s"]

@@ -144,8 +144,16 @@ def column_layers(a: Namespace) -> tuple[float, float]:
     return soil, stiff
 
 
-def linear_column(a: Namespace, motion: mpm.Motion, until: float) -> tuple[np.ndarray, np.ndarray]:
-    """Times and velocities at the surface of a linear column of the ground behind the crest, one cell wide."""
+def linear_column(
+    a: Namespace, motion: mpm.Motion, until: float, remains: float = np.inf
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times and velocities at the surface of a linear column of the ground behind the crest, one cell wide.
+
+    Args:
+        until: time of the end, in whole intervals of 2 `STEP`, or the next one [s].
+        remains: part of the largest velocity below which the last fifth has to be; otherwise the column is followed up to ten times
+            as long.
+    """
     soil, stiff = column_layers(a)
     size, height, counts = (a.cell_size, soil + stiff), stiff, round((soil + stiff) / a.cell_size)
     mesh = bridge.box_mesh(MPI.COMM_SELF, size, (1, counts), body=((-1, height), (2 * a.cell_size, size[1] + 1)))
@@ -159,9 +167,14 @@ def linear_column(a: Namespace, motion: mpm.Motion, until: float) -> tuple[np.nd
     model.absorb(3, impedances=rock_impedances(a))
     model.shake(mpm.Motion(motion.time, 0.5 * motion.velocity), direction=(1, 0))
     top, rows = FollowedNodes(model, np.array([(0.0, size[1])])), [(0.0, 0.0)]
-    for report in model.explicit(until, every=2 * STEP, rayleigh=damping_of(a), conversion=None):
-        rows.append((report.time, top.velocity()[0, 0]))
-    time, velocity = np.array(rows).T
+    every = 2 * STEP
+    until = every * np.ceil(until / every - 1e-9)
+    for end in until * np.arange(1, 11):
+        for report in model.explicit(end, every=every, rayleigh=damping_of(a), conversion=None):
+            rows.append((report.time, top.velocity()[0, 0]))
+        time, velocity = np.array(rows).T
+        if np.abs(velocity[time > end - 0.2 * until]).max() <= remains * np.abs(velocity).max():
+            break
     return time, velocity
 
 
