@@ -15,19 +15,23 @@ from pathlib import Path
 
 import numpy as np
 from common.animation import save_animation
-from common.checks import check_cells, check_two_cells, check_whole
+from common.checks import check_cells, check_two_cells, check_whole, say
 from common.earthquake_plots import save_amplification, save_ground, save_motions, save_record
 from common.earthquake_site import (
     FIELDS,
     STIFF,
+    band_of,
     column_layers,
     conversion_of,
     damping_of,
+    first_frequency,
     laws_of,
     linear_column,
     model_in_equilibrium,
     outcrop_motion,
     rock_impedances,
+    too_coarse,
+    wave_speeds,
 )
 from common.figures import Pictures
 from common.followed import FollowedNodes, cells_near, mean_displacement, numbers_in
@@ -58,6 +62,8 @@ import mpm_core as mpm
 comm = MPI.COMM_WORLD
 AT_REST = 1e-3
 """Part of the largest velocity with which a column is at rest: the spectrum of one that still vibrates lacks what follows"""
+LEAST_SWING = 1e-3
+"""Motion to and fro [m] up to which a slope counts as at rest"""
 COLUMNS = [
     "time_s", "crest_velocity_m_per_s", "crest_level_velocity_m_per_s", "toe_level_velocity_m_per_s",
     "foot_velocity_m_per_s", "slope_displacement_m", "free_field_displacement_m",
@@ -116,6 +122,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
         "--stiff-depth",
     )
     check_motion(p, a)
+    say(too_coarse(a))
     return a
 
 
@@ -206,10 +213,8 @@ def static_safety(a: Namespace) -> float:
 
 def amplified(a: Namespace, motion: mpm.Motion, history: History) -> tuple[tuple, dict[str, tuple]]:
     """Ratios of spectra to the outcrop: closed form, linear column, and free field and crest as they yielded."""
-    band = (a.frequency / 2, a.highest_frequency) if a.motion == "noise" else (a.frequency / 2, 2 * a.frequency)
-    shear = [young / (2 * (1 + a.poisson)) for young in (a.young, a.stiff_young)]
-    density = a.unit_weight / GRAVITY
-    layers = [(thickness, modulus, density) for thickness, modulus in zip(column_layers(a), shear)]
+    band, density = band_of(a), a.unit_weight / GRAVITY
+    layers = [(thickness, density * speed**2, density) for thickness, speed in zip(column_layers(a), wave_speeds(a))]
 
     def ratio(time, velocity, outcrop, smoothing):
         outcrop = np.interp(time, outcrop.time, outcrop.velocity, left=0, right=0)
@@ -263,6 +268,15 @@ def slope_slip(history: History) -> np.ndarray:
     return history["slope_displacement_m"] - history["free_field_displacement_m"]
 
 
+def still_moving(a: Namespace, history: History) -> str:
+    """The end of a line of results: by how much the slope moves to and fro in a last period of the soil, where that counts, or nothing."""
+    slip, period = slope_slip(history), 1 / first_frequency(a)
+    swing = float(np.ptp(slip[history["time_s"] >= history["time_s"][-1] - period]))
+    if swing <= max(0.1 * abs(slip[-1]), LEAST_SWING):
+        return ""
+    return f"; the slope still moves, by {metres(swing)} in the last {period:.2g} s: raise --rest for the displacement that stays"
+
+
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     begins, record = yield_of(a), outcrop_motion(a)
@@ -297,7 +311,7 @@ def main(arguments: list[str] | None = None) -> int:
     said = (
         f"slope displaced by {metres(summary['slope_displacement_m'])}, Newmark's blocks by {metres(slips['toe'][-1])} and "
         f"{metres(slips['crest'][-1])}; linear amplification within {summary['largest_error_of_linear_amplification']:.1%} of "
-        "the closed form"
+        "the closed form" + still_moving(a, history)
     )
     return write_summary(folder, a, summary, comm, page, pictures, said)
 

@@ -31,6 +31,8 @@ STRONG = 1.0
 """Largest acceleration [m/s2] below which a record whose unit is not named is more probably one in g"""
 GAP = 5.0
 """Time between two values of a record, over the usual one, from which on values are missing"""
+CELLS_OF_WAVE = 8
+"""Least number of cells in a shear wave (Kuhlemeyer and Lysmer 1973, J. Soil Mech. Found. Div. 99)"""
 FIELDS = ("displacement", "velocity", "stress", "plastic_strain", "volume", "resting")
 """Of particles and resting cells in the files for ParaView"""
 
@@ -79,11 +81,40 @@ def recorded(a: Namespace) -> tuple[np.ndarray, np.ndarray]:
     return time - time[0], acceleration
 
 
+def wave_speeds(a: Namespace) -> tuple[float, float]:
+    """Of shear waves in soil and stiffer layer [m/s]."""
+    soil, stiff = (
+        float(np.sqrt(young / (2 * (1 + a.poisson)) * GRAVITY / a.unit_weight)) for young in (a.young, a.stiff_young)
+    )
+    return soil, stiff
+
+
+def first_frequency(a: Namespace) -> float:
+    """Of the soil below the crest, on a rigid base [Hz]."""
+    return wave_speeds(a)[0] / (4 * (a.height + a.soil_depth))
+
+
 def damping_of(a: Namespace) -> mpm.Rayleigh:
     """The damping at small strains: as asked for at the first frequency of the soil below the crest, and at five times that."""
-    shear = a.young / (2 * (1 + a.poisson))
-    first = np.sqrt(shear / (a.unit_weight / GRAVITY)) / (4 * (a.height + a.soil_depth))
+    first = first_frequency(a)
     return mpm.Rayleigh.of_ratio(a.damping_ratio, (first, 5 * first))
+
+
+def band_of(a: Namespace) -> tuple[float, float]:
+    """Lowest and highest frequency at which the motion is looked at [Hz]."""
+    return 0.5 * a.frequency, a.highest_frequency if a.motion == "noise" else 2 * a.frequency
+
+
+def too_coarse(a: Namespace) -> str:
+    """A warning of cells that are too large for shear waves of the highest frequency; empty for others."""
+    highest, option = band_of(a)[1], "--highest-frequency" if a.motion == "noise" else "--frequency"
+    length = min(wave_speeds(a)) / highest
+    if a.cell_size <= length / CELLS_OF_WAVE * (1 + 1e-9):
+        return ""
+    return (
+        f"--cell-size is {a.cell_size:g} m, expected {length / CELLS_OF_WAVE:.3g} m at most, an eighth of a shear wave of {highest:g} Hz in "
+        f"the softer soil: higher frequencies hardly pass through larger cells; lower it or {option}"
+    )
 
 
 def ground(a: Namespace) -> tuple:

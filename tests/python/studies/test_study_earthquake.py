@@ -279,3 +279,32 @@ def test_a_slope_that_does_not_stand_is_refused_before_the_earthquake_is_compute
     factor = bridge.log_spiral_safety(6.0, 40.0, *reduced, 18e3, depth=4.0)
     assert 0.95 < factor < 1
     assert f"--cohesion is 4500 Pa and --friction-angle 24 degrees, of which limit analysis finds a factor of safety of {factor:.2f}" in result.stderr  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "motion, highest", [("--highest-frequency 12", 12), ("--motion ricker --frequency 4 --duration 1", 8)]
+)
+def test_cells_that_are_too_coarse_for_the_waves_of_a_motion_are_doubted(motion, highest):
+    """Waves of 8 Hz and more did not pass cells of 2 m, and nothing was said but that the linear column is wrong by 238 %."""
+    study = importlib.import_module("earthquake")
+    soil = "--height 6 --soil-depth 4 --stiff-depth 6 --young 20e6 --stiff-young 60e6 --unit-weight 18e3".split()
+    eighth = np.sqrt(20e6 / 2.6 * 9.81 / 18e3) / highest / 8
+    with pytest.warns(
+        RuntimeWarning, match=f"--cell-size is 2 m, expected {eighth:.3g} m at most, an eighth .* of {highest} Hz"
+    ):
+        study.parse([*soil, *motion.split(), "--cell-size", "2"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        study.parse([*soil, *motion.split(), "--cell-size", "0.5"])
+
+
+def test_a_slope_that_still_vibrates_at_the_end_is_said_to():
+    """A slope was displaced uphill, by 6.5 mm, in the middle of a free vibration."""
+    study = importlib.import_module("earthquake")
+    a, time = study.parse([]), np.linspace(0.0, 10.0, 1001)
+    slip = 0.05 + 0.02 * np.sin(2 * np.pi * study.first_frequency(a) * time)
+    still = study.still_moving(a, {"time_s": time, "slope_displacement_m": slip, "free_field_displacement_m": 0 * time})
+    assert "the slope still moves, by 0.04 m in the last 0.3 s: raise --rest" in still
+    for quiet in (0.05 + 0.1 * (slip - 0.05), 1e-3 * slip):
+        columns = {"time_s": time, "slope_displacement_m": quiet, "free_field_displacement_m": 0 * time}
+        assert study.still_moving(a, columns) == ""
