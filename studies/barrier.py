@@ -32,6 +32,7 @@ from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
 from mpi4py import MPI
+from mpm_core.input_warnings import in_radians
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -97,6 +98,8 @@ def parser() -> ArgumentParser:
 def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     a = p.parse_args(arguments)
+    say(in_radians("--wall-friction-angle", a.wall_friction_angle))
+    say(in_radians("--base-friction-angle", a.base_friction_angle or 0.0))
     if a.duration is None:
         a.duration = max(8.0, 2 * rise(a))
     if a.length is None:

@@ -17,7 +17,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from common.checks import check_effect, check_file
+from common.checks import check_effect, check_file, say
 from common.figures import Pictures
 from common.history import History
 from common.interrupt import Interrupt
@@ -35,6 +35,7 @@ from common.soils import add_law_options, check_law_options, law_of
 from common.summary import write_summary
 from common.terrain_plots import save_map
 from mpi4py import MPI
+from mpm_core.input_warnings import in_radians
 from mpm_core.output import ModelOutput
 
 import fenics_bridge as bridge
@@ -128,6 +129,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check(p, options.dilation_angle <= options.friction_angle, lambda: f"--dilation-angle is {options.dilation_angle:g} degrees, expected "
           f"at most --friction-angle, {options.friction_angle:g} degrees")  # fmt: skip
     check_ground(p, options)
+    say(in_radians("--structure-friction-angle", options.structure_friction_angle))
     check(p, options.spacing <= options.cell_size, lambda: f"--spacing is {options.spacing:g} m, expected --cell-size, "
           f"{options.cell_size:g} m, at most")  # fmt: skip
     return options

@@ -6,6 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 import numpy as np
+from mpm_core.input_warnings import in_radians
 
 import mpm_core as mpm
 from fenics_bridge.terrain import Raster, read_raster
@@ -42,6 +43,7 @@ def check_ground(p: ArgumentParser, a: Namespace) -> None:
     check_file(p, a.turbulence_map, "--turbulence-map")
     check_effect(p, a, a.friction_map is None, ("--ground-friction-angle",), "no --friction-map")
     check_effect(p, a, a.turbulence_map is None, ("--turbulence",), "no --turbulence-map")
+    say(in_radians("--ground-friction-angle", a.ground_friction_angle))
 
 
 def ground_strength(a: Namespace, ground: Raster) -> dict[str, float | Raster]:

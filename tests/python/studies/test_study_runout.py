@@ -165,6 +165,23 @@ def test_weak_coefficients_of_turbulence_are_doubted(tmp_path):
         strength("--turbulence-map", map_of(tmp_path / "t.asc", rupture, (0.5, 400)))
 
 
+@pytest.mark.parametrize(
+    "study, option",
+    [
+        ("runout", "--ground-friction-angle"),
+        ("runout", "--structure-friction-angle"),
+        ("barrier", "--base-friction-angle"),
+        ("barrier", "--wall-friction-angle"),
+    ],
+)
+def test_friction_angles_of_surfaces_in_radians_are_doubted(study, option):
+    """As those of soils are: 0.3 rad are 17 degrees, and a slide on 0.3 degrees runs as if without friction."""
+    with pytest.warns(RuntimeWarning, match=f"{option} is 0.3 degrees; angles are in degrees, and 0.3 rad are 17.2"):
+        importlib.import_module(study).parse(
+            [option, "0.3", *(["--structure", __file__] if "structure" in option else [])]
+        )
+
+
 def test_a_map_of_coefficients_is_doubted(tmp_path):
     _, rupture = strength()
     with pytest.warns(RuntimeWarning, match="--friction-map has values up to 0.4 only, which are angles in degrees"):
