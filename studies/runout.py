@@ -31,6 +31,7 @@ from common.results import open_results
 from common.runout_ground import add_ground_options, check_ground, ground_strength
 from common.runout_places import Places, draw_places, read_places, results_at
 from common.runout_structures import Structure, add_structures, draw_forces, horizontal_force, read_structures
+from common.slope_case import GRAVITY
 from common.soils import add_law_options, check_law_options, law_of
 from common.summary import write_summary
 from common.terrain_plots import save_map
@@ -48,6 +49,8 @@ COLUMNS = ["time_s", "front_m", "centre_x_m", "centre_y_m", "centre_z_m", "faste
            "ground_force_N", "dt_s"]  # fmt: skip
 UNSTRESSED = ("cam-clay", "nor-sand", "sanisand")
 """Laws that cannot begin without stress, as a slide does"""
+FASTER_THAN_FALL = 1.5
+"""Speed of a particle over that of free fall through all of the height, from which on it is noise"""
 LABELS = {"deposit": "Thickness of the deposit [m]", "most": "Largest thickness [m]", "speed": "Largest speed [m/s]"}
 
 
@@ -293,6 +296,8 @@ def run(a: Namespace, model: mpm.Model, watched: Watched, folder: Path) -> tuple
             output.close()  # waits for the last frame
         except mpm.RunError as error:
             stopped = str(error)
+            if "left the background mesh" in stopped:
+                stopped += f"; what leaves it at its top needs more --headroom than {a.headroom:g} m"
     return history, stopped
 
 
@@ -312,6 +317,17 @@ def left_the_mesh(fraction: float) -> str:
     return (
         f"; {fraction:.0%} of its mass left the mesh at its sides: use rasters beyond its reach"
         if fraction > 0.01
+        else ""
+    )
+
+
+def too_fast(fastest: float, height: float) -> str:
+    """The end of a line of results: that single particles are faster [m/s] than what falls freely through a height [m], or nothing."""
+    fall = float(np.sqrt(2 * GRAVITY * height))
+    return (
+        f"; single particles are faster than free fall through all of the height, {fall:.3g} m/s: that is noise, as where a slide hits a "
+        "structure, also in the map of the largest speed; a larger --pic damps it"
+        if fastest > FASTER_THAN_FALL * fall
         else ""
     )
 
@@ -384,6 +400,7 @@ def main(arguments: list[str] | None = None) -> int:
         "particle-steps per second"
         + still_moving(history, a.density * volume - report.outflow_mass) * (stopped is None)
         + left_the_mesh(report.outflow_mass / (a.density * volume))
+        + too_fast(summary["fastest_m_per_s"], top - float(rupture.values.min()))
     )
     return write_summary(folder, a, summary, comm, pictures=pictures if a.pictures else {}, said=said)
 

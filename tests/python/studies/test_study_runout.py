@@ -279,8 +279,8 @@ def test_wrong_options_are_named(capfd, words, message):
     assert message in capfd.readouterr().err
 
 
-def test_a_slide_that_leaves_its_mesh_says_so(tmp_path):
-    """On smooth, steep ground it is gone after some seconds; the run ends with its results."""
+def smooth_and_steep(folder):
+    """Options of a slide on a plane of 45 degrees without friction."""
     from fenics_bridge import terrain
 
     x, y = np.arange(0.0, 81.0, 4.0), np.arange(0.0, 61.0, 4.0)
@@ -288,9 +288,31 @@ def test_a_slide_that_leaves_its_mesh_says_so(tmp_path):
     plane = -1.0 * u
     cap = 4 * np.maximum(1 - ((u - 20) / 12) ** 2 - ((v - 30) / 12) ** 2, 0)
     for name, values in (("a", plane + cap), ("b", plane)):
-        terrain.write_raster(tmp_path / f"{name}.asc", terrain.Raster(x, y, values))
-    files = f"--terrain {tmp_path / 'a.asc'} --rupture {tmp_path / 'b.asc'} --output {tmp_path / 'there'}"
-    rest = "--cell-size 4 --spacing 2 --headroom 8 --ground-friction-angle 0 --frames 20 --time 20 --no-film"
-    run = ended("runout", tmp_path / "there", *files.split(), *rest.split())
+        terrain.write_raster(folder / f"{name}.asc", terrain.Raster(x, y, values))
+    files = f"--terrain {folder / 'a.asc'} --rupture {folder / 'b.asc'} --output {folder / 'there'}"
+    return [*files.split(), *"--cell-size 4 --spacing 2 --ground-friction-angle 0 --frames 20 --no-film".split()]
+
+
+def test_a_slide_that_leaves_its_mesh_says_so(tmp_path):
+    """On smooth, steep ground it is gone after some seconds; the run ends with its results."""
+    run = ended("runout", tmp_path / "there", *smooth_and_steep(tmp_path), *"--headroom 8 --time 20".split())
     assert run.returncode == 1 and "all of the slide has left the mesh by" in run.stderr, run.stderr
     assert "100% of its mass left the mesh at its sides" in run.stdout and (tmp_path / "there" / "most.png").exists()
+
+
+def test_a_slide_that_splashes_out_of_the_top_of_its_mesh_names_the_headroom(tmp_path):
+    """The error asked for supports or outflow, which the study has no options of."""
+    dam = box_file(tmp_path / "dam.stl", (60, -10, -90), (70, 70, 0))
+    options = "--headroom 3 --time 6 --structure-friction-angle 0 --no-pictures --structure".split()
+    run = ended("runout", tmp_path / "there", *smooth_and_steep(tmp_path), *options, str(dam))
+    assert run.returncode == 1 and "what leaves it at its top needs more --headroom than 3 m" in run.stderr, run.stderr
+
+
+def test_particles_that_are_faster_than_they_can_fall_are_said_to_be_noise():
+    """A slide that met a wall with 23 m/s ended with "fastest 114 m/s"."""
+    too_fast = importlib.import_module("runout").too_fast
+    fall = np.sqrt(2 * 9.81 * 31.0)
+    assert f"single particles are faster than free fall through all of the height, {fall:.3g} m/s" in too_fast(
+        1.6 * fall, 31.0
+    )
+    assert too_fast(1.4 * fall, 31.0) == ""
