@@ -50,6 +50,7 @@ from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
 from common.schemes import add_particles_per_cell
+from common.site_laws import unit_doubt
 from common.site_response import amplification, spectral_ratio
 from common.slope_case import GRAVITY, add_soil_options
 from common.summary import write_summary
@@ -122,6 +123,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
         "--stiff-depth",
     )
     check_motion(p, a)
+    say(unit_doubt(vars(a), "the soil"))
     say(too_coarse(a))
     return a
 

@@ -25,7 +25,7 @@ from common.ranks import run_study
 from common.results import open_results
 from common.schemes import averages_strains
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
-from common.slope_fem import step_line, weight
+from common.slope_fem import NO_COHESION, step_line, weight
 from common.summary import write_summary
 from common.watch import Watch
 from mpi4py import MPI
@@ -57,7 +57,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     options = p.parse_args(arguments)
     check_slope_options(p, options)
-    check(p, options.cohesion > 0, "--cohesion is 0, expected a number above 0: without cohesion no slope is stable")
+    check(p, options.cohesion > 0, NO_COHESION)
     return options
 
 

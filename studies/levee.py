@@ -36,6 +36,7 @@ from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
 from common.schemes import add_particles_per_cell
+from common.site_laws import unit_doubt
 from common.slope_case import add_soil_options
 from common.summary import write_summary
 from mpi4py import MPI
@@ -92,6 +93,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check_cells(p, a, 2.3 * length * (a.height + a.sand_depth + a.stiff_depth) / a.cell_size**2, "--cell-size", "--beside",
                 "--sand-depth", "--stiff-depth")  # fmt: skip
     check_motion(p, a)
+    say(unit_doubt(vars(a), "the soil"))
     check_effect(p, a, a.conductivity is not None, ("--stiff-conductivity",), "--conductivity")
     say(too_loose(a))  # and names what is wrong with the parameters of the sand
     return a

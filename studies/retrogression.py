@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from common.animation import save_animation
+from common.checks import say
 from common.figures import Pictures, curve_figure
 from common.front import front
 from common.history import History
@@ -31,6 +32,7 @@ from common.quiet import NOT_REACHED, without_warning
 from common.ranks import run_study
 from common.results import open_results
 from common.schemes import add_pic
+from common.site_laws import unit_doubt
 from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
 from common.summary import write_summary
 from mpi4py import MPI
@@ -227,6 +229,7 @@ def main(arguments: list[str] | None = None) -> int:
     p = parser()
     a = p.parse_args(arguments)
     check_slope_options(p, a)
+    say(unit_doubt(vars(a), "the slope"))
     check(p, a.disturbed >= a.cell_size, lambda: f"--disturbed is {a.disturbed:g} m, expected at least --cell-size, {a.cell_size:g} m: the clay "
           "is disturbed cell by cell")  # fmt: skip
     folder = open_results(a, comm)

@@ -31,6 +31,7 @@ from common.results import open_results
 from common.runout_ground import add_ground_options, check_ground, ground_strength
 from common.runout_places import Places, draw_places, read_places, results_at
 from common.runout_structures import Structure, add_structures, draw_forces, horizontal_force, read_structures
+from common.site_laws import unit_doubt
 from common.slope_case import GRAVITY
 from common.soils import add_law_options, check_law_options, law_of
 from common.summary import write_summary
@@ -132,6 +133,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check(p, options.dilation_angle <= options.friction_angle, lambda: f"--dilation-angle is {options.dilation_angle:g} degrees, expected "
           f"at most --friction-angle, {options.friction_angle:g} degrees")  # fmt: skip
     check_ground(p, options)
+    say(unit_doubt(vars(options), "the slide"))
     say(in_radians("--structure-friction-angle", options.structure_friction_angle))
     check(p, options.spacing <= options.cell_size, lambda: f"--spacing is {options.spacing:g} m, expected --cell-size, "
           f"{options.cell_size:g} m, at most")  # fmt: skip

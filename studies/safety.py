@@ -96,6 +96,10 @@ def parse(arguments: list[str] | None = None) -> Namespace:
           lambda: f"--depth is {options.depth:g}, expected 0 with --particles, which stand on a rigid base")  # fmt: skip
     check(p, options.site is not None or options.seismic_coefficient >= 0,
           lambda: f"--seismic-coefficient is {options.seismic_coefficient:g}, expected at least 0: out of the slope")  # fmt: skip
+    say(
+        f"--seismic-coefficient is {options.seismic_coefficient:g}, more than the weight: it is the horizontal acceleration over that of "
+        "gravity, such as 0.15" * (abs(options.seismic_coefficient) > 1)
+    )
     check_site_options(p, options, {"unreduced", "start", "meshes", "elements", "equilibrium", "particles", "seismic-coefficient",
                                     "critical-seismic"})  # fmt: skip
     return options

@@ -19,7 +19,7 @@ from time import perf_counter
 from typing import Any
 
 from common.checkpoint import Checkpoints, add_checkpoint_options, check_restart, numbered
-from common.checks import check_effect
+from common.checks import check_effect, say
 from common.ensemble import Ensemble, further_members
 from common.history import History
 from common.interrupt import Interrupt
@@ -39,6 +39,7 @@ from common.schemes import (
     run_scheme,
     stable_integration,
 )
+from common.site_laws import unit_doubt
 from common.site_runs import add_site_option, check_site_options
 from common.site_slides import add_strength_factor, site_slide
 from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, initialise
@@ -116,6 +117,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     options = p.parse_args(arguments)
     if options.site is None:
         check_slope_options(p, options)
+        say(unit_doubt(vars(options), "the slope"))
     if options.integration is None:
         stable = stable_integration(options.particles_per_cell, options.cohesion > 0)
         options.integration = "particles" if options.paper else stable

@@ -14,9 +14,16 @@ from mpi4py import MPI
 import fenics_bridge as bridge
 from fenics_bridge.types import MeshTags
 
+from .checks import say
 from .files import ROOT
 from .options import add_choice, add_count, add_number, check
+from .site_laws import unit_doubt
 from .slope_case import SUPPORTS, add_geometry_options, add_soil_options, check_slope_options, soil_of
+
+NO_COHESION = (
+    "--cohesion is 0, expected a number above 0: without cohesion soil at the surface of a slope has no strength; the factor of safety "
+    "of such a slope is tan(friction angle) / tan(angle) where it is dry"
+)
 
 
 def add_fem_slope_options(parser: argparse.ArgumentParser) -> None:
@@ -57,9 +64,8 @@ def check_fem_slope_options(parser: argparse.ArgumentParser, options: argparse.N
     if options.mesh is None and options.angle in (45, 90):
         options.mesh = "fitted"  # as "crossed", for any cell size
     check_slope_options(parser, options, cells=40)
-    check(
-        parser, options.cohesion > 0, "--cohesion is 0, expected a number above 0: without cohesion no slope is stable"
-    )
+    check(parser, options.cohesion > 0, NO_COHESION)
+    say(unit_doubt(vars(options), "the slope"))
 
 
 def mesh_sizes(options: argparse.Namespace) -> list[float]:

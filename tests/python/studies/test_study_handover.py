@@ -38,7 +38,7 @@ def test_particles_converge_to_the_finite_elements(tmp_path):
 @pytest.mark.parametrize(
     ("name", "options", "words"),
     [
-        ("handover", ["--cohesion", "0"], ["--cohesion", "no slope is stable"]),
+        ("handover", ["--cohesion", "0"], ["--cohesion", "soil at the surface of a slope has no strength"]),
         (
             "compare_fem",
             ["--cohesion", "1", "--cell-size", "0.2", "--meshes", "1"],

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from mpi4py import MPI
+from study_main import ended
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -129,3 +130,28 @@ def test_a_raster_without_coordinate_reference_names_the_option(tmp_path):
 
 def test_a_script_without_options_says_what_the_library_says():
     assert in_options(failure_watch.LOCKING, None) == failure_watch.LOCKING
+
+
+@pytest.mark.parametrize("study, words, doubt", [
+    ("safety", "--cohesion 12", "the slope: cohesion is 12 Pa, which hardly any soil has"),
+    ("collapse", "--young 20e3", "the slope: young is 20000 Pa, which hardly any soil has"),
+    ("slope", "--cohesion 1", "the slope: cohesion is 1 Pa, which hardly any soil has"),
+    ("levee", "--young 40", "the soil: young is 40 Pa, which hardly any soil has"),
+    ("earthquake", "--cohesion 25", "the soil: cohesion is 25 Pa, which hardly any soil has"),
+    ("runout", "--young 5e3", "the slide: young is 5000 Pa, which hardly any soil has"),
+    ("safety", "--seismic-coefficient 15", "--seismic-coefficient is 15, more than the weight: it is the horizontal acceleration"),
+])  # fmt: skip
+def test_options_of_soils_that_are_in_other_units_are_doubted_as_those_of_sites_are(study, words, doubt):
+    module = importlib.import_module(study)
+    with pytest.warns(RuntimeWarning, match=doubt):
+        module.parse(words.split())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        module.parse([])
+
+
+def test_a_bank_of_clay_whose_strength_is_in_kpa_is_doubted_before_it_is_refused(tmp_path):
+    result = ended("retrogression", tmp_path / "there", *"--cohesion 15 --cell-size 3 --crest 6 --no-pictures".split())
+    assert (
+        result.returncode == 2 and "the slope: cohesion is 15 Pa, which hardly any soil has" in result.stderr
+    ), result.stderr
