@@ -298,6 +298,21 @@ def test_cells_that_are_too_coarse_for_the_waves_of_a_motion_are_doubted(motion,
         study.parse([*soil, *motion.split(), "--cell-size", "0.5"])
 
 
+def test_the_linear_column_of_resting_cells_says_nothing_of_particles_that_cross_cells():
+    """On coarse cells it spoke of noise of cell crossings, on each rank, and named particles that move with their cells as a remedy."""
+    study = importlib.import_module("earthquake")
+    options = (
+        "--height 6 --soil-depth 4 --stiff-depth 6 --young 20e6 --stiff-young 60e6 --unit-weight 18e3 --cell-size 2"
+    )
+    with pytest.warns(RuntimeWarning, match="an eighth of a shear wave"):
+        a = study.parse([*options.split(), "--highest-frequency", "12"])
+    motion = mpm.motion_of_acceleration(*ricker(12.0, 0.1, 3.0, 0.002))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        _, velocity = study.linear_column(a, motion, 5.0)
+    assert np.abs(velocity).max() > 0
+
+
 def test_a_slope_that_still_vibrates_at_the_end_is_said_to():
     """A slope was displaced uphill, by 6.5 mm, in the middle of a free vibration."""
     study = importlib.import_module("earthquake")
