@@ -19,7 +19,7 @@ from fenics_bridge import compat
 from .checks import say
 from .followed import FollowedNodes
 from .motions import STEP, as_motion, band_limited_noise, ricker
-from .quiet import CROSSINGS, NOT_REACHED, without_warning
+from .quiet import NOT_REACHED, without_warning
 from .slope_case import GRAVITY
 
 comm = MPI.COMM_WORLD
@@ -175,7 +175,6 @@ def column_layers(a: Namespace) -> tuple[float, float]:
     return soil, stiff
 
 
-@without_warning(CROSSINGS)  # coarse cells are said before
 def linear_column(
     a: Namespace, motion: mpm.Motion, until: float, remains: float = np.inf
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -14,9 +14,6 @@ up fills cells in part, and mixed integration then generates energy (docs/contac
 LOCKS = "linear (cells|elements)|the soil fails, and its dilation angle"
 """Beginnings of the warnings of linear cells and elements that lock"""
 
-CROSSINGS = "at t = .* is motion of the particles against their nodes"
-"""Beginning of the warning of noise of cell crossings. In cells that rest no particle crosses; waves shorter than some cells do as much"""
-
 
 @contextmanager
 def without_warning(*beginnings: str) -> Iterator[None]:

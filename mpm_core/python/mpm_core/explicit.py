@@ -128,7 +128,9 @@ def run_explicit(
     most = max(1, model.comm.allreduce(len(model.particles), MPI.MAX))
     pauses = 1 if watch is not None or rebalance < np.inf else max(1, 2_000_000 // most // _core.control_interval)
     advice = ADVICE_FOR.get(options.integration, ADVICE)
-    smooth = options.moving_cells or options.transfer == Transfer.AFFINE  # particles have no motion against their nodes
+    rests = run.conversion is None and model.comm.allreduce(bool(model.particles.is_resting.all()), MPI.LAND)
+    # Particles do not cross cells, or have no motion against their nodes.
+    smooth = options.moving_cells or options.transfer == Transfer.AFFINE or rests
     energy = EnergyWatch(
         energy_limit,
         model.comm.rank == 0,
