@@ -59,17 +59,28 @@ def redirect_compiler_lines() -> None:
 
 
 _cached_module = jit.get_cached_module
+_loaded: dict[tuple[str, ...], Any] = {}
 
 
 def _module_or_error(module_name: str, object_names: Any, cache_dir: Any, timeout: int) -> Any:
-    """FFCx's function of this name, for a form that another process compiles, or was killed compiling."""
+    """FFCx's function of this name, for a form that another process compiles, or was killed compiling.
+
+    A form that this process has loaded is taken from memory: FFCx would list the whole cache to find it again.
+    """
+    key = (str(cache_dir), module_name, *object_names)
+    if key in _loaded:
+        return _loaded[key]
     source = Path(cache_dir) / f"{module_name}.c"
-    with suppress(FileNotFoundError):  # another run may remove it, too
-        ages = [time.time() - path.stat().st_mtime for path in Path(cache_dir).glob(f"{module_name}.*")]
-        if ages and min(ages) > ABANDONED and not source.with_suffix(".c.cached").exists():
-            source.unlink()
+    if not source.with_suffix(".c.cached").exists():
+        with suppress(FileNotFoundError):  # another run may remove it, too
+            ages = [time.time() - path.stat().st_mtime for path in Path(cache_dir).glob(f"{module_name}.*")]
+            if ages and min(ages) > ABANDONED:
+                source.unlink()
     try:
-        return _cached_module(module_name, object_names, cache_dir, timeout)
+        found = _cached_module(module_name, object_names, cache_dir, timeout)
+        if found[0] is not None:
+            _loaded[key] = found
+        return found
     except TimeoutError:
         raise RunError(
             f"a form of the finite elements is not compiled after {timeout} s: another run compiles it, or was ended while it did; if "

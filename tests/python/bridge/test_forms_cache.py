@@ -52,6 +52,16 @@ def test_an_old_file_is_removed_and_the_form_compiled(broken_off):
     assert source.with_suffix(".c.cached").exists()
 
 
+def test_a_form_that_was_loaded_is_not_looked_for_again(tmp_path):
+    """A cache has thousands of files, which FFCx would list for each form."""
+    for _ in ("compiled", "loaded"):
+        assert area(tmp_path) == pytest.approx(1.0)
+    for path in tmp_path.iterdir():
+        path.unlink()
+    assert area(tmp_path) == pytest.approx(1.0)
+    assert not list(tmp_path.iterdir())
+
+
 BODY = """
 import sys
 import mpm_core as mpm
