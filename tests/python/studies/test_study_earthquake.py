@@ -208,7 +208,7 @@ def test_a_recorded_motion_begins_with_the_run_whatever_its_first_time(tmp_path,
 def test_ground_that_moves_far_without_failing_stays_in_resting_cells(tmp_path):
     """A wavelet that moves the outcrop by 0.4 m, a quarter of a cell: all ground turned into particles, which left the mesh."""
     small = (
-        "--cell-size 2.5 --level 10 --soil-depth 5 --stiff-depth 5 --particles-per-cell 1 --cohesion 1e6 --no-pictures"
+        "--cell-size 2.5 --level 10 --soil-depth 5 --stiff-depth 5 --particles-per-cell 1 --cohesion 2e5 --no-pictures"
     )
     result = ended(
         "earthquake",

@@ -5,6 +5,8 @@ import json
 import pytest
 from study_main import ended
 
+COARSE = "--cell-size", "0.2", "--crest", "1.2"
+
 
 def summary_of(name, folder, *options):
     result = ended(name, folder, *options)
@@ -13,7 +15,7 @@ def summary_of(name, folder, *options):
 
 
 def test_every_hand_over_is_in_equilibrium(tmp_path):
-    summary = summary_of("handover", tmp_path, "--time", "0.6")
+    summary = summary_of("handover", tmp_path, "--time", "0.6", *COARSE)
     assert 20e3 < summary["collapse_unit_weight_of_the_finite_elements"] < 27e3  # linear triangles are too stiff
     first, *rest = summary["handovers"]
     assert first["fraction_of_collapse"] == 0 and first["out_of_balance_ratio_before"] is None
@@ -52,12 +54,14 @@ def test_slopes_that_do_not_stand_are_refused(tmp_path, name, options, words):
     assert all(word in result.stderr for word in words), result.stderr
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_hand_over_of_particles_that_move(tmp_path):
-    summary = summary_of("handover", tmp_path, "--time", "0.1", "--move")
+    summary = summary_of("handover", tmp_path, "--time", "0.1", "--move", *COARSE)
     rows = [row for row in summary["handovers"] if row["fraction_of_collapse"] > 0]
     assert all(row["out_of_balance_ratio_after"] < 1e-3 and row["newly_yielded_fraction"] < 0.01 for row in rows)
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_soft_soil_too_within_the_effect_of_its_deformed_shape(tmp_path):
     summary = summary_of("compare_fem", tmp_path, "--cell-size", "0.1", "--meshes", "1", "--young", "200e3")
     assert summary["crest_displacement_difference_on_finest_mesh"]["10000"] < 0.03
