@@ -165,12 +165,12 @@ def test_the_end_of_the_terminal_leaves_a_checkpoint(tmp_path, ranks):
 def test_a_restart_from_something_else_is_refused_on_all_ranks(tmp_path):
     assert slope(tmp_path / "a", "--checkpoint-every", "40").returncode == 0
     checkpoint = str(tmp_path / "a" / "checkpoint.h5")
-    for options, message in [
-        (["--restart", checkpoint, "--cohesion", "2e3"], "--cohesion is 2000.0, but the run of checkpoint"),
-        (["--restart", checkpoint, "--crest", "1.4"], "--crest is 1.4, but the run of checkpoint"),
-        (["--restart", str(tmp_path / "none.h5")], "No such file or directory"),
+    for options, message, ranks in [
+        (["--restart", checkpoint, "--cohesion", "2e3"], "--cohesion is 2000.0, but the run of checkpoint", 2),
+        (["--restart", checkpoint, "--crest", "1.4"], "--crest is 1.4, but the run of checkpoint", 1),
+        (["--restart", str(tmp_path / "none.h5")], "No such file or directory", 2),
     ]:
-        result = slope(tmp_path / "b", *options, ranks=2)
+        result = slope(tmp_path / "b", *options, ranks=ranks)
         assert result.returncode == 2, result.stderr
         assert message in result.stderr
 

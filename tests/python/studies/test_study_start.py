@@ -1,18 +1,13 @@
 """The study slope starts from elasto-plastic equilibrium."""
 
 import json
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
-
-STUDY = Path(__file__).parents[3] / "studies" / "slope.py"
+from study_main import ended
 
 
 def slope(folder, *options):
-    command = [sys.executable, str(STUDY), "--output", str(folder), "--time", "0.05", "--frames", "1", *options]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300)
+    return ended("slope", folder, "--time", "0.05", "--frames", "1", "--no-pictures", *options)
 
 
 @pytest.mark.parametrize("options", [[], ["--nmd", "--mesh", "gmsh"], ["--angle", "60"]])
@@ -28,7 +23,7 @@ def test_particles_are_in_equilibrium_at_once_and_none_yields_anew(tmp_path, opt
 
 def test_initial_unit_weight_beyond_collapse_is_named_with_what_the_slope_carries(tmp_path):
     result = slope(tmp_path, "--initial-unit-weight", "40e3")
-    assert result.returncode == 2 and "Traceback" not in result.stderr
+    assert result.returncode == 2
     assert "--initial-unit-weight is 40000 N/m3" in result.stderr and "does not carry" in result.stderr
     # Linear triangles of 0.1 m are some 20 % too stiff at collapse, which is near 20 kN/m3 without dilation.
     assert 20e3 < float(result.stderr.split("above ")[1].split()[0]) < 26e3
@@ -40,7 +35,7 @@ def test_a_friction_angle_in_radians_is_named_where_the_slope_does_not_carry_its
 
 
 def test_an_inclination_in_radians_is_warned_of(tmp_path):
-    result = slope(tmp_path, "--angle", "0.78", "--time", "0.001", "--no-pictures")
+    result = slope(tmp_path, "--angle", "0.78", "--time", "0.001")
     assert result.returncode == 0 and "warning: --angle is 0.78 degrees; " in result.stderr
     assert "0.78 rad are 44.7 degrees" in result.stderr
 
