@@ -11,13 +11,22 @@ from study_main import STUDIES, ended
 
 PRANDTL = 2 + np.pi
 ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+NO_PICTURES = """
+import sys
+sys.path.insert(0, {studies!r})
+import locking
+from common import summary
+summary.draw_pictures = lambda pictures: None
+locking.run_study(locking.main)
+"""
 
 
 def run(folder, *options, launch=None):
     if launch is None:
         result = ended("locking", folder, *options)
     else:
-        command = [*launch, sys.executable, str(STUDIES / "locking.py"), "--output", str(folder), *options]
+        script = NO_PICTURES.format(studies=str(STUDIES))
+        command = [*launch, sys.executable, "-c", script, "--output", str(folder), *options]
         result = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, **ENVIRONMENT})
     assert result.returncode == 0, result.stderr
     return json.loads((folder / "summary.json").read_text())
