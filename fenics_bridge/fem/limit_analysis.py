@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from mpm_core.input_warnings import warn_of_radians
 from numpy.typing import NDArray
+from scipy import optimize
 
 from fenics_bridge.errors import InputError
 from mpm_core import checks
 
 _Array = NDArray[np.float64]
+
+FAR = 3.0
+"""Logarithm of the collapse load over the load beyond which it does not matter how large it is"""
+ALIKE = 1e-10
+"""Relative difference of loads below which a finer search finds no other"""
 
 
 @dataclass(frozen=True)
@@ -112,13 +119,16 @@ def log_spiral_safety(
     if friction_angle == 0 and _slides_on_a_level(friction_angle, depth, seismic):
         raise InputError(_without_depth(f"seismic={seismic:g} without friction"))
     warn_of_radians(angle=angle, friction_angle=friction_angle)
-    low, high = 1e-2, 1e2
-    for _ in range(24):
-        factor = math.sqrt(low * high)
+
+    def margin(logarithm: float) -> float:
+        factor = math.exp(logarithm)
         reduced = math.degrees(math.atan(math.tan(math.radians(friction_angle)) / factor))
-        stands = _stands(height, angle, cohesion / factor, reduced, unit_weight, depth, seismic)
-        low, high = (factor, high) if stands else (low, factor)
-    return factor
+        return _margin(height, angle, cohesion / factor, reduced, unit_weight, depth, seismic)
+
+    most = 1e2
+    if depth is None and seismic > 0:  # a level that is deep enough slides with any more
+        most = min(most, (1 - ALIKE) * math.tan(math.radians(friction_angle)) / seismic)
+    return math.exp(_root(margin, math.log(1e-2), math.log(most)))
 
 
 def log_spiral_seismic(
@@ -144,21 +154,29 @@ def log_spiral_seismic(
         raise InputError(_without_depth("friction_angle=0"))
     warn_of_radians(angle=angle, friction_angle=friction_angle)
 
-    def stands(seismic: float) -> bool:
-        return _stands(height, angle, cohesion, friction_angle, unit_weight, depth, seismic)
+    def margin(seismic: float) -> float:
+        return _margin(height, angle, cohesion, friction_angle, unit_weight, depth, seismic)
 
-    if not stands(0.0):
+    if margin(0.0) <= 0:
         raise InputError(f"unit_weight is {unit_weight!r} N/m3, expected a slope that stands without inertia")
     low, high = 0.0, 0.5
-    while stands(high):
+    if depth is None:  # a level that is deep enough slides under any more
+        high = (1 - ALIKE) * math.tan(math.radians(friction_angle))
+    while depth is not None and margin(high) > 0:
         low, high = high, 2 * high
-    for _ in range(18):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if stands(middle) else (low, middle)
-    return 0.5 * (low + high)
+    return _root(margin, low, high)
 
 
-def _stands(
+def _root(margin: Callable[[float], float], low: float, high: float) -> float:
+    """Where a margin that falls is zero, to 5e-7; an end where it is not zero between them."""
+    if margin(low) <= 0:
+        return low
+    if margin(high) >= 0:
+        return high
+    return float(optimize.brentq(margin, low, high, xtol=5e-7))
+
+
+def _margin(
     height: float,
     angle: float,
     cohesion: float,
@@ -166,14 +184,14 @@ def _stands(
     unit_weight: float,
     depth: float | None,
     seismic: float,
-) -> bool:
-    """Whether no mechanism moves a slope."""
+) -> float:
+    """Logarithm of the collapse load of a slope over its unit weight, between -FAR and FAR; positive where no mechanism moves it."""
     if _slides_on_a_level(friction_angle, depth, seismic):
-        return False
+        return -FAR
     if friction_angle >= angle + _tilt(seismic):
-        return True
+        return FAR
     slope = _checked(height, angle, cohesion, friction_angle, depth, seismic)
-    return bool(_best(slope).load * cohesion > unit_weight * height)
+    return float(np.clip(np.log(_best(slope).load * cohesion / (unit_weight * height)), -FAR, FAR))
 
 
 class _Slope(NamedTuple):
@@ -255,13 +273,18 @@ def _best(slope: _Slope) -> _Mechanisms:
 
 
 def _searched(mechanisms: Any, slope: _Slope) -> _Mechanisms:
-    """The best of the mechanisms that two fractions between 0 and 1 describe: a grid search, refined around its best point."""
+    """The best of the mechanisms that two fractions between 0 and 1 describe: a grid search, refined around its best point.
+
+    It ends where all loads of the grid are alike. In a corner of the possible ones they never are.
+    """
     centre, half, points = np.full(2, 0.5), 0.5, 25
     for _ in range(20):
         start, end = np.clip(centre[:, None] + half * np.linspace(-1, 1, points), 1e-6, 1 - 1e-6)
-        loads = mechanisms(slope, *np.meshgrid(start, end, indexing="ij")).load
+        loads = mechanisms(slope, start[:, None], end).load
         i, j = np.unravel_index(np.argmin(loads), loads.shape)
         centre, half, points = np.array([start[i], end[j]]), 0.4 * half, 13
+        if loads.max() < (1 + ALIKE) * loads[i, j]:
+            break
     return mechanisms(slope, *centre)
 
 
@@ -326,7 +349,9 @@ def _mechanisms(slope: _Slope, swept: Any, spiral: tuple[_Array, _Array], toe: A
         surface = y[..., -1:] + np.clip((corners[..., 2:3] - x) * math.tan(slope.angle), 0, rise[..., None])
         is_below = (y <= surface + 1e-9).all(axis=-1)
         around = np.concatenate([x, corners[..., 2:0:-1]], axis=-1), np.concatenate([y, y[..., [-1, 0]]], axis=-1)
-        moment = _moment(*around) + slope.seismic * _moment(around[1], -around[0])
+        moment = _moment(*around)
+        if slope.seismic > 0:
+            moment += slope.seismic * _moment(around[1], -around[0])
         ratio = np.exp(2 * swept * slope.tangent)
         dissipation = (ratio - 1) / (2 * slope.tangent) if slope.tangent > 0 else swept
         is_possible = is_below & (moment > 0) & (rise > 0) & (shoulder >= x[..., 0])
@@ -344,7 +369,6 @@ def _moment(x: _Array, y: _Array) -> Any:
     size, distance = np.hypot(u, v).max(axis=-1), np.hypot(x[..., 0], y[..., 0])
     origin = np.where(size < 0.1 * distance, 1.0, 0.0)[..., None]
     x0, y0 = origin * x[..., :1], origin * y[..., :1]
-    u, v = x - x0, y - y0
-    u_next, v_next = np.roll(u, -1, axis=-1), np.roll(v, -1, axis=-1)
-    cross = u * v_next - u_next * v
-    return -np.sum((u + u_next) * cross, axis=-1) / 6 - x0[..., 0] * np.sum(cross, axis=-1) / 2
+    u, v = (np.concatenate([a, a[..., :1]], axis=-1) for a in (x - x0, y - y0))  # back to the first point
+    cross = u[..., :-1] * v[..., 1:] - u[..., 1:] * v[..., :-1]
+    return -np.sum((u[..., :-1] + u[..., 1:]) * cross, axis=-1) / 6 - x0[..., 0] * np.sum(cross, axis=-1) / 2

@@ -92,7 +92,7 @@ body.advance(60.0)
 @pytest.mark.parametrize(
     "study, arguments",
     [
-        pytest.param(LOADED, [(bridge.SLOPE,), (bridge.SLOPE,), (bridge.CREST, bridge.LEFT)], id="tags"),
+        pytest.param(LOADED, [(bridge.SLOPE,), (bridge.CREST, bridge.LEFT)], id="tags"),
         pytest.param(WET, [(2e-4, 1.6, 1e-5), (3e-4, 2.3, 4e-6)], id="soils"),
     ],
 )
