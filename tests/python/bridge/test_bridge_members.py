@@ -86,7 +86,7 @@ def test_a_plastic_hinge_limits_the_moment_and_the_soil_carries_the_rest():
     supports = [bridge.fixed(BOTTOM), bridge.roller(LEFT, (0, 1)), bridge.roller(RIGHT, (0, 1))]
 
     def solved(plastic_moment):
-        fem = body((length, 1.0), (16, 4), mpm.LinearElastic(young=1e4, poisson=0.0), supports)
+        fem = body((length, 1.0), (8, 2), mpm.LinearElastic(young=1e4, poisson=0.0), supports)
         fem.reconfigure(members={"beam": mpm.beam([(0.0, 1.0), (length, 1.0)], 1e8, 1e6, plastic_moment)})
         fem.solve(bridge.Load(pressure={TOP: 1e3}))
         assert fem.converged
@@ -196,7 +196,7 @@ def test_a_member_that_a_stage_removes_and_installs_is_stressed_anew():
 
 def slab(thick=0.1):
     """A strong slab 6 m long on a thin layer of clay on a rigid base; the strength of the clay is 10 kPa."""
-    domain, cell_tags, facet_tags = tagged((6.0, 0.3), (60, 6), lambda x, y: np.where(y < thick, 1, 2))
+    domain, cell_tags, facet_tags = tagged((6.0, 0.3), (60, 3), lambda x, y: np.where(y < thick, 1, 2))
     laws = {1: mpm.tresca(young=20e6, poisson=0.3, shear_strength=10e3), 2: mpm.LinearElastic(young=200e6, poisson=0.3)}
     return bridge.QuasiStatic(domain, laws, facet_tags, [bridge.fixed(BOTTOM)], cell_tags=cell_tags)
 
@@ -251,7 +251,7 @@ def test_a_geogrid_carries_no_compression():
     assert fem.reaction(TOP)[1] == pytest.approx(1e6 * 0.005, rel=1e-9)
 
 
-@pytest.mark.parametrize(("degree", "cells"), [(1, 4), (2, 4), (1, 8)])
+@pytest.mark.parametrize(("degree", "cells"), [(1, 2), (2, 2), (1, 4)])
 def test_an_anchor_is_pulled_out_by_the_strength_of_its_bond(degree, cells):
     """A block on rollers hangs on an anchor alone, whose body of 1.5 m slips under the force q L, on all meshes alike."""
     bond, length = 4e3, 1.5
@@ -271,7 +271,7 @@ def test_an_anchor_is_pulled_out_by_the_strength_of_its_bond(degree, cells):
     middles = (forces.positions[1:, 0] + forces.positions[:-1, 0]) / 2
     assert np.all(change[1:] <= bond * np.diff(middles)[1:] * (1 + 1e-9))
     with pytest.warns(RuntimeWarning, match="the load was not reached"):
-        fem.solve(bridge.Load(traction={RIGHT: (1.1 * bond * length / 2.0, 0.0)}))
+        fem.solve(bridge.Load(traction={RIGHT: (1.02 * bond * length / 2.0, 0.0)}), tolerance=0.01)
     assert fem.member_forces("anchor").axial_force[0] == pytest.approx(bond * length, rel=2e-3)
 
 
@@ -406,7 +406,7 @@ def test_a_prestress_that_the_soil_does_not_bear_has_a_reason_without_a_number_t
 
 def test_names_of_soils_whose_strength_stays_are_known_after_stages():
     """A slab under t on clay of 10 kPa: half of it is not reduced, t L = s_u L (1 + 1 / F) / 2."""
-    domain, numbers, facet_tags = tagged((6.0, 0.3), (60, 6), lambda x, y: np.where(y > 0.1, 3, np.where(x < 3, 1, 2)))
+    domain, numbers, facet_tags = tagged((6.0, 0.3), (60, 3), lambda x, y: np.where(y > 0.1, 3, np.where(x < 3, 1, 2)))
     cell_tags = bridge.name_tags(numbers, {"left": 1, "right": 2, "slab": 3})
     clay = mpm.tresca(young=20e6, poisson=0.3, shear_strength=10e3)
     laws = {"left": clay, "right": clay, "slab": mpm.LinearElastic(young=200e6, poisson=0.3)}
