@@ -53,6 +53,10 @@ class Column:
             water_modulus=water_modulus,
         )
         self.top, self.base = np.append(side, 1.0), np.append(side, 0.0)
+        self.start_again()
+
+    def start_again(self):
+        """Put the column back to where nothing has drained or settled yet."""
         self.model.initialise(pore_pressure=self._hydrostatic)
 
     def _hydrostatic(self, x):

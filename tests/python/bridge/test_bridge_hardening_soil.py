@@ -42,7 +42,7 @@ def test_a_column_settles_by_its_oedometer_modulus_and_rises_by_that_of_unloadin
 def test_the_factor_of_safety_is_that_of_mohr_and_coulomb():
     factors = {}
     for kind in ("hardening", "perfect"):
-        model = slope_model(0.1)
+        model = slope_model(0.2)
         if kind == "hardening":
             law = mpm.HardeningSoil(
                 secant_modulus=2e6, oedometer_modulus=2e6, unloading_modulus=6e6, cohesion=1e3, friction_angle=25.0,

@@ -37,7 +37,7 @@ def tagged_box(size, cells):
 
 def passive_coefficient(cells, fraction=FRACTION):
     """Horizontal pressure of a wall that is pushed into weightless soil, 1 m high, over the surcharge; and its friction."""
-    domain, cell_tags, facet_tags = tagged_box((5.0, 2.0), (5 * cells, 2 * cells))
+    domain, cell_tags, facet_tags = tagged_box((4.0, 2.0), (4 * cells, 2 * cells))
     soil = mpm.MohrCoulomb(young=1e8, poisson=0.3, cohesion=1.0, friction_angle=25.0, dilation_angle=25.0)
     laws = {1: soil}
     if fraction < 1:

@@ -156,11 +156,12 @@ def test_factor_of_safety_without_dilation_is_the_published_one(degree, cell_siz
 
 def test_bearing_capacity_without_dilation():
     """Nc of phi = 30 degrees is 30.14 with associated flow; without dilation it lies between that and Davis' value."""
-    domain, _, facet_tags = bridge.read_mesh(MESHES / "footing.geo", MPI.COMM_WORLD)
+    sizes = {"near_size": 0.2, "edge_size": 0.05, "far_size": 1.0}
+    domain, _, facet_tags = bridge.read_mesh(MESHES / "footing.geo", MPI.COMM_WORLD, parameters=sizes)
     law = mpm.MohrCoulomb(young=1e7, poisson=0.3, cohesion=1e3, friction_angle=30.0)
     supports = [bridge.roller(1, (1, 0)), bridge.roller(3, (1, 0)), bridge.fixed(2)]
     model = bridge.QuasiStatic(domain, law, facet_tags, supports)
-    result = bridge.collapse_load(model, lambda q: bridge.Load(pressure={5: q}), first_step=4e3, tolerance=5e-3)
+    result = bridge.collapse_load(model, lambda q: bridge.Load(pressure={5: q}), first_step=4e3, tolerance=1e-2)
     davis = bridge.davis_strength(law)
     tangent = np.tan(np.radians(davis.friction_angle))
     prandtl = (np.exp(np.pi * tangent) * np.tan(np.radians(45 + davis.friction_angle / 2)) ** 2 - 1) / tangent
@@ -172,7 +173,8 @@ def test_a_vertical_cut_that_softens_fails_between_its_residual_and_its_peak_str
     def cut(law):
         domain, _, facet_tags = bridge.soil_mesh(*bridge.slope_mesh(MPI.COMM_WORLD, angle=90))
         supports = [bridge.roller(bridge.LEFT, (1, 0)), bridge.fixed(bridge.BASE)]
-        result = bridge.collapse_load(bridge.QuasiStatic(domain, law, facet_tags, supports), weight, first_step=1e3)
+        model = bridge.QuasiStatic(domain, law, facet_tags, supports)
+        result = bridge.collapse_load(model, weight, first_step=1e3, tolerance=5e-3)
         assert result.failed
         return result.value
 
@@ -210,7 +212,7 @@ def on_ground(cell_size, height, angle, width, depth, cohesion, friction_angle, 
 SLOPES = {
     "the paper's slope": lambda solver: slope_model(0.2, "fitted", dilation_angle=0.0, solver=solver),
     "a bank with little cohesion": lambda solver: on_ground(1.0, 3.0, 26.565, 24.0, 6.0, 2e3, 34.0, solver),
-    "a step of 1 m in a body of 30 m": lambda solver: on_ground(0.25, 1.0, 90.0, 30.0, 5.0, 6e3, 20.0, solver),
+    "a step of 1 m in a body of 30 m": lambda solver: on_ground(0.5, 1.0, 90.0, 30.0, 5.0, 6e3, 20.0, solver),
 }
 
 
@@ -230,7 +232,7 @@ def test_a_tolerance_over_the_forces_of_all_of_the_body_does_not_hide_a_small_me
 
     def stands(solver):
         slope = SLOPES["a step of 1 m in a body of 30 m"](solver)
-        slope.law = bridge.reduced_strength(slope.law, 3.0)  # the factor of safety is 1.6
+        slope.law = bridge.reduced_strength(slope.law, 3.0)  # the factor of safety is 1.8
         slope.solve(weight(20e3))
         return slope.converged
 

@@ -40,9 +40,9 @@ def deflections():
     """At rest, by number of cells along each side and by NMD or not."""
     shear_wave = np.sqrt(YOUNG / (2 * (1 + POISSON)))
     found = {}
-    for n, nmd in ((8, False), (8, True), (16, False), (16, True)):
+    for n, nmd in ((8, True), (16, False), (16, True)):
         model = membrane(n)
-        reports = model.explicit(900 / shear_wave, every=180 / shear_wave, damping=0.5, nmd=nmd, courant=0.8)
+        reports = model.explicit(800 / shear_wave, every=100 / shear_wave, damping=0.5, nmd=nmd, courant=0.8)
         *_, before, found[n, nmd] = (deflection(model) for report in reports)
         assert found[n, nmd] == pytest.approx(before, rel=0.01)
     return found

@@ -86,6 +86,8 @@ def test_points_on_facets_are_found_where_coordinates_are_those_of_a_map(dim):
     points = 0.025 * (np.indices([32] * dim).reshape(dim, -1).T + 0.5) + origin
     found = mesh.cells_of(points)
     assert (found >= 0).all()
-    assert smallest_shape_functions(mesh, points[::7])[np.arange(len(points[::7])), found[::7]].min() > -1e-7
+    step = {2: 7, 3: 61}[dim]  # a table of points and cells
+    some = points[::step]
+    assert smallest_shape_functions(mesh, some)[np.arange(len(some)), found[::step]].min() > -1e-7
     outside = points[points[:, 0] > origin[0] + 0.78] + 0.025 * np.eye(dim)[0]
     assert (mesh.cells_of(outside) == -1).all()

@@ -75,12 +75,12 @@ def slope_at_rest():
     """Displacement of the crest at 10 s and where the explicit slide ends."""
     model = slope()
     crest = {}
-    for until in (10.0, 65.0, 75.0):
+    for until in (10.0, 45.0, 50.0):
         *_, report = model.explicit(until, damping=0.75, **PARTICLES)
         crest[until] = crest_displacement(model)
     assert report.kinetic_energy < 1e-3 * report.external_work
-    assert crest[75.0] - crest[65.0] < 0.01 * crest[75.0]
-    return crest[10.0], crest[75.0]
+    assert crest[50.0] - crest[45.0] < 0.005 * crest[50.0]
+    return crest[10.0], crest[50.0]
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_damped_slope_comes_to_rest_where_the_explicit_one_does(slope_at_rest, s
     dt = multiple * model.critical_time_step()
     list(model.implicit(10.0, dt=dt, damping=0.75, solver=solver, **PARTICLES))
     assert crest_displacement(model) == pytest.approx(on_the_way, rel=0.1)
-    *_, report = model.implicit(75.0, dt=dt, damping=0.75, solver=solver, **PARTICLES)
+    *_, report = model.implicit(50.0, dt=dt, damping=0.75, solver=solver, **PARTICLES)
     assert report.kinetic_energy < 1e-5 * report.external_work
     assert crest_displacement(model) == pytest.approx(at_rest, rel=0.1)
 
@@ -111,7 +111,7 @@ def test_without_shock_and_crossing_noise_both_schemes_come_to_rest_in_the_same_
         model.set_gravity((0.0, -9.81), ramp=5.0)
         dt = options.pop("multiple", 0.5) * model.critical_time_step()
         run = getattr(model, scheme)
-        report = run(75.0, dt=dt, every=75.0, damping=0.75, integration=mpm.Integration.MIXED, **options).last()
+        report = run(50.0, dt=dt, every=50.0, damping=0.75, integration=mpm.Integration.MIXED, **options).last()
         assert report.kinetic_energy < 1e-3 * report.external_work
         return crest_displacement(model)
 

@@ -48,7 +48,7 @@ def test_settlements_are_off_where_the_warning_appears_and_right_elsewhere(eleme
     dt = first_step(column, ratio)
     count, text = warned(lambda: column.model.run(5 * dt, dt, growth=1.0))
     assert count == (ratio > 1)
-    fine = Column(element, 10 * CELLS, nmd=nmd, across=20)  # with the same steps, so that their error does not count
+    fine = Column(element, 5 * CELLS, nmd=nmd, across=10)  # with the same steps, so that their error does not count
     fine.model.run(dt, dt, growth=1.0)
     coarse = Column(element, CELLS, nmd=nmd)
     coarse.model.advance(dt)

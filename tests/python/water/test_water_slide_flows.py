@@ -77,7 +77,7 @@ def test_they_are_refused_before_any_work(tmp_path, monkeypatch):
         drawdown.main(arguments.split())
 
 
-def test_a_slide_through_strata_that_dip_begins_in_equilibrium(tmp_path):
+def test_a_slide_through_strata_that_dip_begins_in_equilibrium(tmp_path, without_pictures):
     import json
 
     import drawdown
