@@ -204,7 +204,9 @@ def test_soil_without_dilation_fails_no_earlier_than_in_quadratic_elements():
     def found(cell_size, **options):
         return factor_of_bank(bank(cell_size, loam(0.0), **options))
 
-    linear, quadratic = ([found(size, **o) for size in (2.0, 0.75)] for o in ({"degree": 1, "nmd": True}, {"degree": 2}))
+    linear, quadratic = (
+        [found(size, **o) for size in (2.0, 0.75)] for o in ({"degree": 1, "nmd": True}, {"degree": 2})
+    )
     assert all(one.failed for one in linear + quadratic)
     excess = [one.value / other.value - 1 for one, other in zip(linear, quadratic)]
     assert -0.01 < excess[1] < 0.6 * excess[0]
