@@ -92,7 +92,9 @@ def run(quick: bool, folder) -> Result:
                for friction, found in nq_found.items()]  # fmt: skip
     for friction, exact in () if quick else MARTIN.items():
         extrapolated = 2 * ngamma(friction, float(FULL)) - ngamma(friction, float(QUICK))
-        checks.append(Check(f"Nγ, φ {friction:g}°", exact, "Martin 2005, method of characteristics", extrapolated, 0.03))
+        checks.append(
+            Check(f"Nγ, φ {friction:g}°", exact, "Martin 2005, method of characteristics", extrapolated, 0.03)
+        )
 
     # --- 4. Picture -------------------------------------------------------------------------------------------------
     if MPI.COMM_WORLD.rank == 0:
