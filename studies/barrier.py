@@ -50,8 +50,14 @@ COLUMNS = [
     "unexplained_fraction_of_energy",
     "dt_s",
 ]
+THROWN = 0.02
+"""Part of the sand beside the wall that may be thrown higher than the run-up: single particles rise to the top of the mesh"""
 FULL = 0.5
 """Part of the time in which sand rises at the wall, thrown up with the velocity of the flow, until the bore is taken as formed"""
+
+AVERAGED = 2.0
+"""Least time over which the force is averaged, in multiples of depth over velocity: sand with a steep front bounces off the wall, and is
+back after some 1.7"""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -123,8 +129,11 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check(p, a.length > 2 / np.tan(np.radians(a.front_angle)),
           lambda: f"--length is {a.length:g}, expected more than twice the front's, "
           f"{1 / np.tan(np.radians(a.front_angle)):.3g}")  # fmt: skip
-    say(f"--length is {a.length:g}, so that the end of the flow is felt before its bore has formed at the wall: take {formed(a) * length_of_passage(a):.3g} "
-        "or more" * (formed(a) >= end_felt(a)))  # fmt: skip
+    least = formed(a) + AVERAGED
+    say(f"--length is {a.length:g}, so that the end of the flow is felt before its bore has formed at the wall and pushed for some time: take "
+        f"{least * length_of_passage(a):.3g} or more" * (end_felt(a) < least))  # fmt: skip
+    say(f"--duration is {a.duration:g}, so that the run ends before the bore has formed at the wall and pushed for some time: take {least:.3g} "
+        "or more" * (a.duration < least))  # fmt: skip
     check_whole(p, 1 / a.cell_size, f"--cell-size is {a.cell_size:g}, expected 1 over a whole number, such as 0.125")
     check_cells(p, a, 6 * a.length * (1 + a.froude) / a.cell_size**2, "--cell-size", "--length", "--froude")
     check_restart(p, a, body_runs.MAY_CHANGE)
@@ -236,23 +245,36 @@ def build(a: Namespace) -> mpm.Model:
     return model
 
 
+def run_up(a: Namespace, wall: mpm.RigidContact) -> float:
+    """Height above the plane of what rises at the wall [m]: of all but a part of the sand beside it. Collective."""
+    p, face = wall.model.particles, wall.outline()[0][:, 0].min()
+    beside = p.position[:, 0] > face - 0.5 * a.depth
+    height, mass = (np.concatenate(each) for each in zip(*comm.allgather((p.position[beside, 1], p.mass[beside]))))
+    if height.size == 0:
+        return 0.0
+    order = np.argsort(height)
+    below = np.cumsum(mass[order])
+    highest = height[order][np.searchsorted(below, (1 - THROWN) * below[-1])]
+    return max(float(highest) - a.cell_size * a.depth, 0.0)
+
+
 def row(a: Namespace, wall: mpm.RigidContact, history: History, report: mpm.Report) -> dict[str, float]:
     """A row of the history. Collective."""
-    x, face = wall.model.particles.position, wall.outline()[0][:, 0].min()
-    near = x[x[:, 0] > face - 0.5 * a.depth, 1].max(initial=0.0)
     return {
         "time_s": report.time, "force_factor": mean_force(history, wall, report.time, 0) / unit_force(a),
-        "impulse_Ns": wall.impulse[0], "run_up_m": max(comm.allreduce(float(near), MPI.MAX) - a.cell_size * a.depth, 0.0),
+        "impulse_Ns": wall.impulse[0], "run_up_m": run_up(a, wall),
         "kinetic_energy_J_per_m": report.kinetic_energy, "unexplained_fraction_of_energy": report.unexplained_fraction,
         "dt_s": report.dt,
     }  # fmt: skip
 
 
 def full_force(a: Namespace, history: History) -> float | None:
-    """Mean force over rho g h^2 since the bore has formed, until the end of the flow is felt; None where there is no such time."""
+    """Mean force over rho g h^2 since the bore has formed, until the end of the flow is felt; None where that is less than `AVERAGED`."""
     time = history["time_s"] / passage(a)
-    chosen = (time >= formed(a)) & (time <= end_felt(a))
-    return float(history["force_factor"][chosen].mean()) if chosen.any() else None
+    begin, end = formed(a), min(end_felt(a), time[-1])
+    if end - begin < AVERAGED * (1 - 1e-9):
+        return None
+    return float(history["force_factor"][(time >= begin) & (time <= end)].mean())
 
 
 # --- 3. Pictures -----------------------------------------------------------------------------------------------------
@@ -316,7 +338,11 @@ def main(arguments: list[str] | None = None) -> int:
         "largest_force_N_per_m": float(history["force_factor"].max()) * unit_force(a), "velocity_m_per_s": velocity(a),
         "largest_run_up_m": float(history["run_up_m"].max()), "outflow_mass_kg": model.report().outflow_mass,
     }  # fmt: skip
-    shown = "not known without a bore that has formed" if force is None else f"{1e-3 * force * unit_force(a):.2f} kN/m"
+    shown = (
+        "not known without a bore that has formed and pushed for some time"
+        if force is None
+        else f"{1e-3 * force * unit_force(a):.2f} kN/m"
+    )
     said = (
         f"force of the flow: {shown}; of a bore in a fluid {1e-3 * fluid * unit_force(a):.2f}, in sand under passive pressure "
         f"{1e-3 * passive * unit_force(a):.2f} kN/m"
