@@ -58,7 +58,7 @@ def test_factor_of_safety_is_that_of_one_rank(shared_path):
 @pytest.mark.parametrize("move", [False, True])
 def test_hand_overs_of_the_study(shared_path, monkeypatch, move):
     monkeypatch.setattr(handover, "FRACTIONS", (0.9,))
-    options = ["--cell-size", "0.1", "--time", "0.02", *(["--move"] if move else [])]
+    options = ["--cell-size", "0.2", "--crest", "1.2", "--time", "0.02", *(["--move"] if move else [])]
     (row,) = summary_of(handover, shared_path, *options)["handovers"]
     assert row["out_of_balance_ratio_after"] < 1e-3 and row["newly_yielded_fraction"] < 0.01
     assert move or row["out_of_balance_ratio_before"] < 1e-8
