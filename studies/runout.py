@@ -28,11 +28,11 @@ from common.progress import Progress
 from common.quiet import without_warning
 from common.ranks import run_study
 from common.results import open_results
+from common.runout_endings import left_the_mesh, still_moving, too_fast
 from common.runout_ground import add_ground_options, check_ground, ground_strength
 from common.runout_places import Places, draw_places, read_places, results_at
 from common.runout_structures import Structure, add_structures, draw_forces, horizontal_force, read_structures
 from common.site_laws import unit_doubt
-from common.slope_case import GRAVITY
 from common.soils import add_law_options, check_law_options, law_of
 from common.summary import write_summary
 from common.terrain_plots import save_map
@@ -50,8 +50,6 @@ COLUMNS = ["time_s", "front_m", "centre_x_m", "centre_y_m", "centre_z_m", "faste
            "ground_force_N", "dt_s"]  # fmt: skip
 UNSTRESSED = ("cam-clay", "nor-sand", "sanisand")
 """Laws that cannot begin without stress, as a slide does"""
-FASTER_THAN_FALL = 1.5
-"""Speed of a particle over that of free fall through all of the height, from which on it is noise"""
 LABELS = {"deposit": "Thickness of the deposit [m]", "most": "Largest thickness [m]", "speed": "Largest speed [m/s]"}
 
 
@@ -301,37 +299,6 @@ def run(a: Namespace, model: mpm.Model, watched: Watched, folder: Path) -> tuple
             if "left the background mesh" in stopped:
                 stopped += f"; what leaves it at its top needs more --headroom than {a.headroom:g} m"
     return history, stopped
-
-
-def still_moving(history: History, mass: float) -> str:
-    """The end of a line of results: the speed of a slide whose kinetic energy is not below a hundredth of its maximum, or nothing."""
-    energy = history["kinetic_energy_J"]
-    if not energy[-1] > 0.01 * energy.max():
-        return ""
-    return (
-        f"; the slide still moves, by {np.sqrt(2 * energy[-1] / mass):.2g} m/s on average (root mean square): the maps are not those of a "
-        "deposit at rest, raise --time"
-    )
-
-
-def left_the_mesh(fraction: float) -> str:
-    """The end of a line of results: how much of the slide went beyond the rasters, where it is more than a hundredth."""
-    return (
-        f"; {fraction:.0%} of its mass left the mesh at its sides: use rasters beyond its reach"
-        if fraction > 0.01
-        else ""
-    )
-
-
-def too_fast(fastest: float, height: float) -> str:
-    """The end of a line of results: that single particles are faster [m/s] than what falls freely through a height [m], or nothing."""
-    fall = float(np.sqrt(2 * GRAVITY * height))
-    return (
-        f"; single particles are faster than free fall through all of the height, {fall:.3g} m/s: that is noise, as where a slide hits a "
-        "structure, also in the map of the largest speed; a larger --pic damps it"
-        if fastest > FASTER_THAN_FALL * fall
-        else ""
-    )
 
 
 # --- 4. All together -------------------------------------------------------------------------------------------------
