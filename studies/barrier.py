@@ -24,6 +24,7 @@ from common.checkpoint import check_restart
 from common.checks import check_cells, check_effect, check_whole, say
 from common.figures import Pictures, curve_figure
 from common.flow_impact import bore
+from common.front import front
 from common.history import History
 from common.movie import QUANTITIES, WET_QUANTITIES, particle_movie
 from common.options import add_number, check, study_parser
@@ -249,13 +250,9 @@ def run_up(a: Namespace, wall: mpm.RigidContact) -> float:
     """Height above the plane of what rises at the wall [m]: of all but a part of the sand beside it. Collective."""
     p, face = wall.model.particles, wall.outline()[0][:, 0].min()
     beside = p.position[:, 0] > face - 0.5 * a.depth
-    height, mass = (np.concatenate(each) for each in zip(*comm.allgather((p.position[beside, 1], p.mass[beside]))))
-    if height.size == 0:
+    if comm.allreduce(int(beside.sum())) == 0:
         return 0.0
-    order = np.argsort(height)
-    below = np.cumsum(mass[order])
-    highest = height[order][np.searchsorted(below, (1 - THROWN) * below[-1])]
-    return max(float(highest) - a.cell_size * a.depth, 0.0)
+    return max(front(p.position[beside, 1], p.mass[beside], THROWN) - a.cell_size * a.depth, 0.0)
 
 
 def row(a: Namespace, wall: mpm.RigidContact, history: History, report: mpm.Report) -> dict[str, float]:
