@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -120,6 +121,7 @@ def log_spiral_safety(
         raise InputError(_without_depth(f"seismic={seismic:g} without friction"))
     warn_of_radians(angle=angle, friction_angle=friction_angle)
 
+    @cache  # the search asks for those of the ends several times
     def margin(logarithm: float) -> float:
         factor = math.exp(logarithm)
         reduced = math.degrees(math.atan(math.tan(math.radians(friction_angle)) / factor))
@@ -154,6 +156,7 @@ def log_spiral_seismic(
         raise InputError(_without_depth("friction_angle=0"))
     warn_of_radians(angle=angle, friction_angle=friction_angle)
 
+    @cache  # the search asks for those of the ends several times
     def margin(seismic: float) -> float:
         return _margin(height, angle, cohesion, friction_angle, unit_weight, depth, seismic)
 
@@ -162,8 +165,9 @@ def log_spiral_seismic(
     low, high = 0.0, 0.5
     if depth is None:  # a level that is deep enough slides under any more
         high = (1 - ALIKE) * math.tan(math.radians(friction_angle))
-    while depth is not None and margin(high) > 0:
-        low, high = high, 2 * high
+    else:
+        while margin(high) > 0:
+            low, high = high, 2 * high
     return _root(margin, low, high)
 
 
