@@ -41,6 +41,7 @@ from .checks import say
 from .site_doubts import warn_of_reservoirs
 from .site_file import Site, site_of
 from .site_flow import boundary_of, wet_soils
+from .site_k0 import of_soils
 from .site_keys import CHANGES, DAY, changes_of, read_site_table
 from .site_mesh import part_of_mesh
 from .slope_case import GRAVITY
@@ -170,8 +171,7 @@ class ConsolidationSite:
     def _carry_weight(self, fem: bridge.QuasiStatic, pressure: Any) -> None:
         """Bring new elements to the equilibrium of the beginning; pressure: of the water, a function of positions [Pa]. Collective."""
         there, load = [soil for soil in self.soils if soil not in self.stages[0].off], self.load(0.0)
-        k0, ratios = ({soil: value for soil, value in given.items() if soil in there}
-                      for given in (self.site.k0, self.site.overconsolidation))  # fmt: skip
+        k0, ratios = (of_soils(there, given) for given in (self.site.k0, self.site.overconsolidation))
         stage = bridge.Stage("beginning", there, unit_weight=self.site.unit_weight, pressure=load.pressure, k0=k0,
                              overconsolidation=ratios, pore_pressure=pressure, install=dict(self.stages[0].members))  # fmt: skip
         try:

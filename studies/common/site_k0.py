@@ -77,11 +77,12 @@ def from_the_beginning(
     say(_forgetting(site, path))
     if not (stages and has_beginning):
         return list(stages)
-    k0, ratios = (_of(stages[0].fill, given) for given in (site.k0, site.overconsolidation))
+    k0, ratios = (of_soils(stages[0].fill, given) for given in (site.k0, site.overconsolidation))
     return [replace(stages[0], k0=k0, overconsolidation=ratios), *stages[1:]]
 
 
-def _of(soils: Sequence[str], given: Mapping[str, float]) -> dict[int | str, float]:
+def of_soils(soils: Sequence[str], given: Mapping[str, float]) -> dict[int | str, float]:
+    """What is given by soil, of some soils."""
     return {soil: given[soil] for soil in soils if soil in given}
 
 
