@@ -21,6 +21,7 @@ from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.fem.solver import PRACTICE, Solver
 from fenics_bridge.fem.stages import Stage, StageError, StageReport, carry_out, hydrostatic
 from fenics_bridge.fem.strength import davis_reduced_strength, davis_strength, reduced_strength
+from fenics_bridge.fem.strength_ratio import StrengthRatio
 from fenics_bridge.fem.supports import Support, fixed, flat_normal, prescribed, roller
 from fenics_bridge.forms import redirect_compiler_lines, repair_cache
 from fenics_bridge.mesh.background import background_arrays, background_mesh, original_cells
@@ -43,7 +44,7 @@ __all__ = [
     "BASE", "BODY", "CREST", "EMPTY", "LEFT", "PRACTICE", "RIGHT", "SLOPE", "SOIL", "TOP", "Collapse", "Difference",
     "ElasticSolution", "EquilibriumReport", "FarField", "FemSite", "Geometry", "Handover", "InputError", "Load", "LoadStep",
     "LogSpiral", "MixedQuasiStatic", "ParticleSafety", "ParticleSite", "PointSearch", "QuasiStatic", "Solver", "Stage",
-    "StageError", "StageReport", "Support", "apply_supports", "background_arrays", "background_mesh", "boundary_forces",
+    "StageError", "StageReport", "StrengthRatio", "Support", "apply_supports", "background_arrays", "background_mesh", "boundary_forces",
     "box_mesh", "carry_out", "collapse_load", "compare", "davis_reduced_strength", "davis_strength", "evaluate_at",
     "factor_of_safety", "fixed", "flat_normal", "graded_tags", "hydrostatic", "initialise", "k0_elastic", "k0_jaky",
     "k0_layered_stress", "k0_stress", "log_spiral", "log_spiral_safety", "log_spiral_seismic", "name_tags", "names_of", "nodal_average",

@@ -8,7 +8,7 @@ the same to Newton's method.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -32,9 +32,16 @@ def switch_off(model: Any) -> None:
 
 
 def reconfigure(
-    model: Any, off: Any, supports: Any, pore_pressure: Any, stress: Any, law: Any, members: Any = None
+    model: Any,
+    off: Any,
+    supports: Any,
+    pore_pressure: Any,
+    stress: Any,
+    law: Any,
+    members: Any = None,
+    parameters: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> None:
-    """Apply the changes of `QuasiStatic.reconfigure`."""
+    """Apply the changes of `QuasiStatic.reconfigure`; parameters: new values of those that vary, as for `take_over`."""
     domain, points, before = model.domain, model.points, model.laws
     off = model.off if off is None else off
     off = tag_numbers(domain.comm, model.cell_tags, off, "off", "cell") if len(off) else ()
@@ -50,7 +57,7 @@ def reconfigure(
     new = was_off & np.repeat(there.x.array[points.cells] > 0, points.per_cell)
     given = given_stress(model, stress, new)
     points.assign(np.where(there.x.array[: owned_cells(domain)] > 0, model._materials.number, -1), len(laws))
-    take_over(model, new, laws, before, given)
+    take_over(model, new, laws, before, given, parameters)
     model.law, model.off = law, off
     _support(model, model.supports if supports is None else tuple(supports), there)
     space = model.displacement.function_space
@@ -84,8 +91,18 @@ def given_stress(model: Any, stress: Any, new: Any) -> NDArray[np.float64] | Non
     return given
 
 
-def take_over(model: Any, new: Any, laws: Sequence[Any], before: Any, given: Any) -> None:
-    """Stress and state of the points under the new laws: removed soil has none, new soil starts from its initial state."""
+def take_over(
+    model: Any,
+    new: Any,
+    laws: Sequence[Any],
+    before: Any,
+    given: Any,
+    parameters: Mapping[str, NDArray[np.float64]] | None = None,
+) -> None:
+    """Stress and state of the points under the new laws: removed soil has none, new soil starts from its initial state.
+
+    parameters: values (n,) of laws' parameters that vary, by name, which the points have from now on; NaN where they keep theirs
+    """
     points = model.points
     points.stress[points.off], points.state[points.off], points.deviatoric_strain[points.off] = 0.0, 0.0, 0.0
     if given is not None:
@@ -94,6 +111,9 @@ def take_over(model: Any, new: Any, laws: Sequence[Any], before: Any, given: Any
     changed = np.array([one is not other for one, other in zip(laws, before)])
     other = (of_point >= 0) & (new | changed[np.maximum(of_point, 0)])
     points.reset_state(laws, np.flatnonzero(other))
+    for name, values in (parameters or {}).items():
+        points.set_parameter(laws, name, values)
+        other |= ~np.isnan(values)
     if model.domain.comm.allreduce(int(other.sum())):
         failure = points.update(laws, np.zeros_like(points.stress))  # brings stresses inside the new strength
         agree(model.domain.comm, f"stress: {failure}" if failure else None)

@@ -121,10 +121,10 @@ def stress_at_rest(
     laws: Mapping[int, Law],
     k0: Mapping[int, float],
     before: Collection[int],
-) -> NDArray[np.float64]:
-    """Stresses at rest at `points.coordinates()`: (n, S) [Pa], zero at points of soils without K0. Collective.
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Stresses at rest at `points.coordinates()`, and the same as the nodal forces have them: (n, S) [Pa], zero in soils without K0.
 
-    Structural members carry nothing, since they come without strain; those that hold water back do so.
+    Collective. Structural members carry nothing, since they come without strain; those that hold water back do so.
 
     Args:
         fem: the finite elements.
@@ -147,11 +147,14 @@ def stress_at_rest(
         twin.reconfigure(off=off, pore_pressure=state.pore_pressure, members=_without_stiffness(state.members))
     report = twin.equilibrate(Load({tag: state.unit_weight[tag] for tag in state.there}, state.pressure))
     agree(fem.domain.comm, None if report.converged else f"k0: the ground at rest has no equilibrium: {report.reason}")
-    stress = np.zeros_like(fem.points.stress)
     rows = rows_of(fem, k0)
-    by_cell = twin.points.stress.reshape(len(twin.points.cells), twin.points.per_cell, -1)
-    stress[rows] = by_cell[np.argsort(twin.points.cells)][fem.points.cells].reshape(stress.shape)[rows]
-    return stress
+
+    def in_order(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        by_cell = values.reshape(len(twin.points.cells), twin.points.per_cell, -1)
+        found = by_cell[np.argsort(twin.points.cells)][fem.points.cells].reshape(values.shape)
+        return np.where(rows[:, None], found, 0.0)
+
+    return in_order(twin.points.stress), in_order(twin._kinematics.carried_stress())
 
 
 def rows_of(fem: QuasiStatic, tags: Collection[int]) -> NDArray[np.bool_]:

@@ -130,6 +130,10 @@ class AveragedKinematics:
         compat.forward(self._forces)
         return self._forces
 
+    def carried_stress(self) -> NDArray[np.float64]:
+        """The stress (n, S) [Pa] of the points as the nodal forces have it, without alternation of its mean from cell to cell. Collective."""
+        return self._strain.averaged_stress(self._points.stress)
+
     def stiffness(self) -> PETSc.Mat | FactoredStiffness:
         """Stiffness of the cells' present tangent, without the rows and columns of the supports. Collective."""
         dofs = self._constraints.dofs

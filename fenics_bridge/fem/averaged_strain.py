@@ -94,12 +94,16 @@ class AveragedStrain:
 
     def forces(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
         """Forces on this rank's own dofs of a stress (n, S). Collective."""
-        forces = self.volumes[:, None] * stress
-        pressure = self.of_forces * forces[:, : self.normal].sum(axis=1) / self.normal
+        return self._forces_of((self.volumes[:, None] * self.averaged_stress(stress)).ravel())
+
+    def averaged_stress(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A stress (n, S) with its mean over the normal components averaged as the forces have it: (n, S). Collective."""
+        averaged = stress.copy()
+        mean = averaged[:, : self.normal].sum(axis=1) / self.normal
         volumes, per_volume = self.weights(self.of_forces)
-        mean = self._over_nodes(self.corners * per_volume * self._to_nodes(pressure))
-        forces[:, : self.normal] += (volumes * mean - pressure)[:, None]
-        return self._forces_of(forces.ravel())
+        of_nodes = self._over_nodes(self.corners * per_volume * self._to_nodes(self.of_forces * self.volumes * mean))
+        averaged[:, : self.normal] += (self.of_forces * (self._present * of_nodes - mean))[:, None]
+        return averaged
 
 
 class _Product:

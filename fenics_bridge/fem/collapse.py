@@ -23,6 +23,11 @@ from fenics_bridge.fem.strength import reduced_strength
 from fenics_bridge.mesh.names import names_of
 from fenics_bridge.types import Laws
 
+HALVINGS = 3
+"""How often the first factor of safety is halved at most"""
+LEAST_CARRIED = 0.1
+"""Part of the load under which a body must fail for that to help"""
+
 
 @dataclass(frozen=True)
 class Collapse:
@@ -115,7 +120,8 @@ def factor_of_safety(
     Args:
         model: finite elements, unloaded or in equilibrium under a load on the way to `load`, with any law that `reduce` knows.
         load: load under which the factor is found.
-        start: factor to begin with; the body must carry the load with its strength divided by it (below 1: raised).
+        start: factor to begin with, below 1 with more strength than the laws have. Where the body then carries a part of the load only, it is
+            halved, up to three times.
         first_step: first increment of the factor.
         tolerance: fraction of the factor below which steps end [-]; `failed_at` is above the result by twice this fraction at most
             where failure was shown.
@@ -136,14 +142,19 @@ def factor_of_safety(
         )
     law = model.law
     unreduced = _tags_of(model, law, unreduced)
-    model.law = reduce(law, start, unreduced)
 
     def weaken(factor: float) -> Any:
         return model.equilibrate(load, law=reduce(law, factor, unreduced))
 
     try:
+        model.law = reduce(law, start, unreduced)
         warn_of_locking_at_failure(model)  # of the reduced laws, whose flow may be associated
-        steps = model.solve(load, progress=progress)
+        for halving in range(HALVINGS + 1):
+            steps = model.solve(load, progress=progress)
+            if model.converged or halving == HALVINGS or not _may_carry(steps):
+                break
+            start *= 0.5
+            model.law = reduce(law, start, unreduced)
         agree(model.domain.comm, None if model.converged else _not_carried(start, steps))
         found = _follow(model, weaken, start, first_step, tolerance, progress)
         warn_of_few_cells(model, found.mechanism)
@@ -151,6 +162,12 @@ def factor_of_safety(
         model.law = law
     model.converged = found.value >= 1.0
     return found
+
+
+def _may_carry(steps: list[LoadStep]) -> bool:
+    """Whether more strength may help a body that does not carry its load: it fails under a good part of it."""
+    failed = any(step.report.outcome == "failure" for step in steps)
+    return failed and max((step.value for step in steps if step.converged), default=0.0) > LEAST_CARRIED
 
 
 def _tags_of(model: Any, law: Laws, unreduced: Collection[int | str]) -> Collection[int | str]:

@@ -6,20 +6,21 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from mpm_core.members import Member
+from mpm_core.members import Member, of_members
 from numpy.typing import NDArray
 
 from fenics_bridge.compat import cell_dofs
 from fenics_bridge.errors import agree
-from fenics_bridge.fem.active_cells import cells_there, switch_off
+from fenics_bridge.fem.active_cells import cells_there, reconfigure, switch_off
 from fenics_bridge.fem.at_rest import rows_of, stress_at_rest, warn_beyond_strength
 from fenics_bridge.fem.load_steps import LoadStep
 from fenics_bridge.fem.loads import Load
-from fenics_bridge.fem.overconsolidation import hardened
+from fenics_bridge.fem.overconsolidation import hardened, upward
 from fenics_bridge.fem.quasi_static import QuasiStatic
-from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport
+from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport, require_stages
+from fenics_bridge.fem.strength_ratio import STRENGTH, StrengthRatio, strengths, vertical_stress
 from fenics_bridge.mesh.names import known_tags, label, tag_numbers
-from fenics_bridge.types import OfPosition
+from fenics_bridge.types import Law, OfPosition
 
 
 class FemSite:
@@ -93,19 +94,8 @@ class FemSite:
         """
         fem = self.fem
         state, _, _ = self.state.after(stage)
-        k0, ratios = state.k0_of(stage), state.overconsolidation_of(stage, self._laws(state))
-        given = (
-            stress_at_rest(fem, state, self._off(state.there), self._laws(state), k0, self.state.there) if k0 else None
-        )
-        if stage.reset_displacement:
-            fem.reset_displacement()
-        if replaced := set(stage.remove).intersection(stage.install):
-            fem.reconfigure(members={name: one for name, one in fem.members.items() if name not in replaced})
-        load = self._enter(state, stage.stress if given is None else given)
-        if given is not None:
-            rows = rows_of(fem, k0)
-            warn_beyond_strength(fem.domain.comm, f"stage {stage.name!r}: ", given[rows], fem.points.stress[rows])
-        steps = fem.solve(load, **self._options)
+        ratios = state.overconsolidation_of(stage, self._laws(state))
+        steps = fem.solve(self._begin(stage, state), **self._options)
         self.number += 1
         if not fem.converged:
             raise StageError(self._failure(stage, steps), 1.0 - fem.load.held)
@@ -118,7 +108,8 @@ class FemSite:
 
         It is for the factor of safety, which hardly depends on the stresses before failure, also of ground that does not carry its
         weight and in which therefore no stage has an equilibrium. Soil with friction that does not drain (`mpm.Undrained`) has the
-        strength of its effective stress, and needs `carry_out`.
+        strength of its effective stress, and needs `carry_out`. The stages before the last one that has a `strength_ratio` are carried out,
+        since their stresses give that strength.
 
         Args:
             stages: the stages from the beginning on; at least one.
@@ -129,22 +120,29 @@ class FemSite:
         Raises:
             InputError: there is no stage, one was carried out before, or one has an unknown soil or boundary or prescribes a
                 displacement. Raised on all ranks alike.
+            StageError: a stage before the last one with a `strength_ratio` has no equilibrium.
 
         Example:
             >>> site = bridge.FemSite(fem)
             >>> safety = bridge.factor_of_safety(fem, site.place(stages))
         """
-        comm, state, number = self.fem.domain.comm, self.state, 0
+        comm, stages = self.fem.domain.comm, list(stages)
         agree(comm, f"stage {self.number} has been carried out, expected a new site" if self.number else None)
-        for number, stage in enumerate(stages, start=1):
+        agree(comm, None if stages else "stages is empty, expected those of the site")
+        require_stages(self, stages)
+        moved = [stage.name for stage in stages if any(v for one in stage.support for v in one.displacement or ())]
+        agree(comm, f"stage {moved[0]!r}: support prescribes a displacement: carry_out applies it" if moved else None)
+        last = max((number for number, stage in enumerate(stages) if stage.strength_ratio), default=0)
+        for stage in stages[:last]:
+            self.carry_out(stage)
+        state = self.state
+        if stages[last].strength_ratio:
+            state, _, _ = state.after(stages[last])
+            self._begin(stages[last], state)
+            last += 1
+        for stage in stages[last:]:
             state, _, _ = state.after(stage)
-            moved = any(v for support in stage.support for v in (support.displacement or ()))
-            agree(
-                comm,
-                f"stage {stage.name!r}: support prescribes a displacement: carry_out applies it" if moved else None,
-            )
-        agree(comm, None if number else "stages is empty, expected those of the site")
-        self.number = number
+        self.number = len(stages)
         return self._enter(state)
 
     def largest_displacement(self) -> float:
@@ -164,10 +162,63 @@ class FemSite:
         active = cells_there(self.fem.domain, self.fem.cell_tags, off) if off else None
         self.fem.require_members(members, active, where)
 
-    def _enter(self, state: SiteState, stress: OfPosition | NDArray[np.float64] | None = None) -> Load:
-        """Change the body to a state; returns the state's load, which does not act yet. stress: of soils that are placed."""
-        off = self._off(state.there)
-        self.fem.reconfigure(off, state.supports, state.pore_pressure, stress, self._laws(state), state.members)
+    def _begin(self, stage: Stage, state: SiteState) -> Load:
+        """Make the changes of a stage, which leads to a state; returns the state's load, which does not act yet."""
+        fem, laws, before = self.fem, self._laws(state), self.state.there
+        k0, ratios = state.k0_of(stage), state.strength_ratio_of(stage, laws)
+        given, carried = (
+            stress_at_rest(fem, state, self._off(state.there), laws, k0, before) if k0 else (None, fem.points.stress)
+        )
+        strength = self._strength(ratios, laws, carried)
+        if stage.reset_displacement:
+            fem.reset_displacement()
+        if replaced := set(stage.remove).intersection(stage.install):
+            fem.reconfigure(members={name: one for name, one in fem.members.items() if name not in replaced})
+        load = self._enter(state, stage.stress if given is None else given, strength)
+        if given is not None:
+            rows = rows_of(fem, k0)
+            warn_beyond_strength(fem.domain.comm, f"stage {stage.name!r}: ", given[rows], fem.points.stress[rows])
+        return load
+
+    def _strength(
+        self, ratios: Mapping[int, StrengthRatio], laws: Mapping[int, Law], placed: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """Undrained strengths (n,) [Pa] of soils with a strength ratio under their stresses, NaN elsewhere; None without any.
+
+        Args:
+            ratios: by cell tag.
+            laws: by cell tag, from now on.
+            placed: stresses (n, S) [Pa] with which soils are placed that were not there before.
+        """
+        if not ratios:
+            return None
+        points, before, present = self.fem.points, self.fem.law_by_tag(), self.fem._kinematics.carried_stress()
+        found = np.full(points.n, np.nan)
+        for tag, ratio in ratios.items():
+            rows, law = rows_of(self.fem, (tag,)), before[tag]
+            if tag in self.state.there:
+                vertical = vertical_stress(law, present[rows], points.state[rows, : law.n_state])
+            else:
+                vertical = -placed[rows, upward(placed)]
+            found[rows] = strengths(laws[tag], ratio, vertical)
+        return found
+
+    def _enter(
+        self,
+        state: SiteState,
+        stress: OfPosition | NDArray[np.float64] | None = None,
+        strength: NDArray[np.float64] | None = None,
+    ) -> Load:
+        """Change the body to a state; returns the state's load, which does not act yet.
+
+        Args:
+            state: the state.
+            stress: of soils that are placed.
+            strength: cohesion (n,) [Pa] of the points from now on, NaN where it stays; None where all stay.
+        """
+        off, parameters = self._off(state.there), {} if strength is None else {STRENGTH: strength}
+        laws, members = self._laws(state), of_members(state.members)
+        reconfigure(self.fem, off, state.supports, state.pore_pressure, stress, laws, members, parameters)
         self.state = state
         moved = any(v for s in state.supports for v in (s.displacement or ()) if v)
         return Load({tag: state.unit_weight[tag] for tag in state.there}, state.pressure, float(moved))

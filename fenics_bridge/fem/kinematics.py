@@ -67,6 +67,10 @@ class Kinematics:
         self._stress.x.array.reshape(-1, self._points.size)[self._stress_rows] = stress
         return assembled(self._internal, self._space, self._forces)
 
+    def carried_stress(self) -> NDArray[np.float64]:
+        """The stress (n, S) [Pa] of the points as the nodal forces have it: as it is."""
+        return self._points.stress
+
     def stiffness(self) -> PETSc.Mat:
         """Matrix of the points' present tangent, without the rows and columns of the supports. Collective."""
         return self.stiffness_of(self._points.tangent)

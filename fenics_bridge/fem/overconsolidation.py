@@ -69,10 +69,7 @@ def hardened(law: Law, stress: NDArray[np.float64], state: NDArray[np.float64], 
         State variables, shape (n, n_state).
     """
     soil, names, result = hardening_soil_in(law), law.state_names, state.copy()
-    effective = stress.copy()
-    if EXCESS in names:
-        effective[:, :3] += state[:, names.index(EXCESS), None]
-    up = 1 if stress.shape[1] == 4 else 2
+    effective, up = effective_stress(law, stress, state), upward(stress)
     level = np.zeros_like(stress)  # its largest principal stress is the vertical one, whatever K0 of the ground
     level[:, :3] = normal_k0(soil) * np.minimum(effective[:, up], 0.0)[:, None]
     level[:, up] = np.minimum(effective[:, up], 0.0)
@@ -81,6 +78,25 @@ def hardened(law: Law, stress: NDArray[np.float64], state: NDArray[np.float64], 
             column = names.index(name)
             result[:, column] = np.maximum(result[:, column], values)
     return result
+
+
+def effective_stress(law: Law, stress: NDArray[np.float64], state: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The effective stress of points [Pa], tension positive, shape (n, S): that of the skeleton, where the stress of a law is the total one.
+
+    Args:
+        law: law of the points.
+        stress: stress [Pa], tension positive, shape (n, S).
+        state: state variables, shape (n, n_state).
+    """
+    effective = stress.copy()
+    if EXCESS in law.state_names:
+        effective[:, :3] += state[:, law.state_names.index(EXCESS), None]
+    return effective
+
+
+def upward(stress: NDArray[np.float64]) -> int:
+    """Component of the vertical stress in stresses of shape (n, S); the last axis of the space points up."""
+    return 1 if stress.shape[1] == 4 else 2
 
 
 def normal_k0(law: Any) -> float:

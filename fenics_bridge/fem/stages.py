@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from mpm_core.members import Member
 from fenics_bridge.errors import InputError, agree, is_finite
 from fenics_bridge.fem.k0 import LARGEST_K0, Surface, surface_height
 from fenics_bridge.fem.overconsolidation import LARGEST, require_hardening_soil
+from fenics_bridge.fem.strength_ratio import StrengthRatio, require_cohesive
 from fenics_bridge.fem.supports import Support
 from fenics_bridge.types import Law, OfPosition
 from mpm_core import _core
@@ -59,6 +60,9 @@ class Stage:
     overconsolidation: dict[int | str, float] = field(default_factory=dict)
     """Overconsolidation ratio by soil of `fill`, whose law is HardeningSoil: at the end of this stage the soil has the hardening of ground that
     has been normally consolidated to so many times its vertical effective stress"""
+    strength_ratio: dict[int | str, StrengthRatio] = field(default_factory=dict)
+    """Undrained strength over vertical effective stress by soil, whose law is from now on one without friction that varies in its cohesion. The
+    stress is that at the beginning of the stage, and of soils of `fill`, which need `k0`, the one with which they come"""
     reset_displacement: bool = False
     """Whether displacements count from the beginning of this stage"""
     install: dict[str, Member] = field(default_factory=dict)
@@ -254,6 +258,12 @@ class SiteState:
             other = next((s for s in soils if set(self._cells_of(s, where + argument)).difference(fill)), None)
             wrong = None if other is None else f"{where}{argument} is given for {other!r}, expected a soil of fill"
             agree(self._comm, wrong)
+        weak, k0 = self._by_soil(where + "strength_ratio", stage.strength_ratio), self.k0_of(stage)
+        absent = next((tag for tag in weak if tag not in new.there), None)
+        agree(self._comm, None if absent is None else f"{where}strength_ratio: the soil {name(absent)} is not there")
+        bare = next((tag for tag in weak if tag in fill and tag not in k0), None)
+        wrong = "comes without stress, expected k0 for it, or its strength_ratio in a later stage"
+        agree(self._comm, None if bare is None else f"{where}strength_ratio: the soil {name(bare)} {wrong}")
         without = [tag for tag in new.there if tag not in new.unit_weight]
         agree(self._comm, f"{where}unit_weight: the soil {self._name_of(without[0])} has none" if without else None)
         pressure = {n: p for key, p in stage.pressure.items() for n in self._facets_of(key, where + "pressure")}
@@ -309,6 +319,21 @@ class SiteState:
         require_hardening_soil(self._comm, where, laws, ratios, self._name_of)
         return ratios
 
+    def strength_ratio_of(self, stage: Stage, laws: Mapping[int, Law]) -> dict[int, StrengthRatio]:
+        """Strength ratios that a stage gives, by the tags of their soils. Collective.
+
+        Args:
+            stage: the stage.
+            laws: laws by cell tag from this stage on, of these soils at least.
+
+        Raises:
+            InputError: the law of a soil has another strength. Raised on all ranks alike.
+        """
+        where = f"stage {stage.name!r}: "
+        ratios = self._by_soil(where + "strength_ratio", stage.strength_ratio)
+        require_cohesive(self._comm, where, laws, ratios, self._name_of)
+        return ratios
+
     def _numbers(self, argument: str, names: Any) -> Any:
         return tuple(dict.fromkeys(n for name in names for n in self._cells_of(name, argument)))
 
@@ -329,7 +354,7 @@ def _wrong_member(stage: Stage, where: str, there: Mapping[str, Member]) -> str 
 
 def _wrong_value(stage: Stage, where: str) -> str | None:
     """Error in the values of a stage; None without an error."""
-    for name in ("unit_weight", "pressure", "law", "k0", "overconsolidation"):
+    for name in ("unit_weight", "pressure", "law", "k0", "overconsolidation", "strength_ratio"):
         if not isinstance(getattr(stage, name), dict):
             what = "boundary" if name == "pressure" else "soil"
             return f"{where}{name} is {getattr(stage, name)!r}, expected a dictionary by {what}"
@@ -353,6 +378,9 @@ def _wrong_value(stage: Stage, where: str) -> str | None:
             return (
                 f"{where}overconsolidation is {value!r} for {key!r}, expected a ratio from 1 to {LARGEST:g}, such as 2"
             )
+    for key, value in stage.strength_ratio.items():
+        if not isinstance(value, StrengthRatio):
+            return f"{where}strength_ratio is {value!r} for {key!r}, expected a StrengthRatio"
     if stage.k0 and stage.stress is not None:
         return f"{where}stress and k0 are given, expected one of them"
     for key, law in stage.law.items():

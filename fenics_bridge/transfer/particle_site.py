@@ -12,12 +12,13 @@ import mpm_core as mpm
 from fenics_bridge.errors import InputError, agree, real_numbers
 from fenics_bridge.fem.at_rest import warn_beyond_strength
 from fenics_bridge.fem.fem_site import FemSite
-from fenics_bridge.fem.overconsolidation import hardened
+from fenics_bridge.fem.overconsolidation import hardened, upward
 from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport
+from fenics_bridge.fem.strength_ratio import STRENGTH, StrengthRatio, strengths, vertical_stress
 from fenics_bridge.fem.supports import Support, not_supports
 from fenics_bridge.transfer.handover import Handover, initialise
 from fenics_bridge.transfer.particle_forces import boundary_forces, seepage_forces
-from fenics_bridge.transfer.particles_at_rest import place_at_rest, stress_at_rest
+from fenics_bridge.transfer.particles_at_rest import carried_stress, place_at_rest, stress_at_rest
 
 
 class ParticleSite:
@@ -107,21 +108,28 @@ class ParticleSite:
         self._refuse_resting(state, stage)
         self._refuse_occupied(fill, stage)
         k0, laws = state.k0_of(stage), {tag: model.laws[material[tag]] for tag in state.there}
-        ratios = state.overconsolidation_of(stage, laws)
-        at_rest = (
+        ratios, weak = state.overconsolidation_of(stage, laws), state.strength_ratio_of(stage, laws)
+        at_rest, carried = (
             stress_at_rest(self, state, laws, k0, gravity=self._g, per_cell=self._per_cell, **self._options)
             if k0
-            else {}
+            else ({}, {})
         )
         if stage.reset_displacement:
             model.particles.set("initial_position", model.particles.position)
         model.remove(np.isin(model.mesh.cell_tags[model.particles.cell], excavate))
+        vertical = self._vertical_stress([tag for tag in weak if tag not in fill])
         self._change_laws(material)
         first = model._next_id
         for tag in fill:
             self._fill(tag, state.unit_weight[tag], stage)
+        placed = {tag: self.rows_of(tag) & (model.particles.id >= first) for tag in at_rest}
+        vertical |= {
+            tag: (np.sort(model.particles.id[placed[tag]]), -stress[:, upward(stress)])
+            for tag, stress in carried.items()
+            if tag in weak
+        }
+        self._strengthen(weak, vertical, laws)
         if at_rest:
-            placed = {tag: self.rows_of(tag) & (model.particles.id >= first) for tag in at_rest}
             given, admissible = place_at_rest(model, at_rest, placed)
             warn_beyond_strength(model.comm, f"stage {stage.name!r}: ", given, admissible)
         self._weigh(state)
@@ -236,6 +244,34 @@ class ParticleSite:
             model.assign(numbers)
             model.particles.set("state", state)
             model._seeded(0, 0)  # gives laws that ask for it the size of the cells
+
+    def _vertical_stress(self, soils: Sequence[int]) -> dict[int, tuple[NDArray[np.int64], NDArray[np.float64]]]:
+        """Numbers of the particles of soils in rising order, and their vertical effective stresses [Pa], compression positive, by tag."""
+        if not soils:
+            return {}
+        p, found = self.model.particles, {}
+        stress = carried_stress(self.model, bool(self._options.get("nmd")))
+        for tag in soils:
+            rows, law = np.flatnonzero(self.rows_of(tag)), self.model.laws[self._material[tag]]
+            rows = rows[np.argsort(p.id[rows])]
+            found[tag] = p.id[rows], vertical_stress(law, stress[rows], p.state[rows, : law.n_state])
+        return found
+
+    def _strengthen(
+        self,
+        ratios: Mapping[int, StrengthRatio],
+        vertical: Mapping[int, tuple[NDArray[np.int64], NDArray[np.float64]]],
+        laws: Mapping[int, Any],
+    ) -> None:
+        """Give the particles of soils the undrained strength of strength ratios, by tag, under vertical stresses of `_vertical_stress`."""
+        ids = self.model.particles.id
+        values = np.full(len(ids), np.nan)
+        for tag, ratio in ratios.items():
+            of_soil, stress = vertical[tag]
+            rows = np.flatnonzero(np.isin(ids, of_soil))
+            values[rows] = strengths(laws[tag], ratio, stress)[np.searchsorted(of_soil, ids[rows])]
+        if ratios:
+            self.model.set_parameter(STRENGTH, values)
 
     def _harden(self, ratios: Mapping[int, float]) -> None:
         """Give the particles of soils the hardening of overconsolidation ratios [-], by tag, under their present stresses."""

@@ -13,6 +13,7 @@ from fenics_bridge.errors import agree
 from fenics_bridge.fem.at_rest import laws_at_rest
 from fenics_bridge.fem.stages import SiteState, Stage, StageError
 from fenics_bridge.types import Law
+from mpm_core import _core
 
 if TYPE_CHECKING:
     from fenics_bridge.transfer.particle_site import ParticleSite
@@ -20,8 +21,10 @@ if TYPE_CHECKING:
 
 def stress_at_rest(
     site: ParticleSite, state: SiteState, laws: Mapping[int, Law], k0: Mapping[int, float], **options: Any
-) -> dict[int, NDArray[np.float64]]:
-    """Stresses at rest of the particles that are to be placed, by the tag of their soil, in the order of their numbers. Collective.
+) -> tuple[dict[int, NDArray[np.float64]], dict[int, NDArray[np.float64]]]:
+    """Stresses at rest of the particles that are to be placed, and the same as the nodal forces have them. Collective.
+
+    Both are by the tag of their soil, in the order of their numbers.
 
     They are those of other particles in the same cells, which keep their places. Soil that was there before counts as being where it
     was placed.
@@ -50,13 +53,27 @@ def stress_at_rest(
     except StageError as error:
         problem = f"k0: the ground at rest has no equilibrium: {error}"
     agree(comm, problem)
-    return {tag: _in_order(model, twin.rows_of(tag)) for tag in k0}
+    carried, p = carried_stress(model, bool(options.get("nmd"))), model.particles
+    rows = {tag: np.flatnonzero(twin.rows_of(tag)) for tag in k0}
+    ordered = {tag: each[np.argsort(p.id[each])] for tag, each in rows.items()}
+    return {tag: p.stress[each] for tag, each in ordered.items()}, {tag: carried[each] for tag, each in ordered.items()}
 
 
-def _in_order(model: mpm.Model, rows: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Stresses of some particles in the order of their numbers."""
-    p = model.particles
-    return p.stress[rows][np.argsort(p.id[rows])]
+def carried_stress(model: mpm.Model, nmd: bool) -> NDArray[np.float64]:
+    """The stresses (n, S) [Pa] of particles as the nodal forces have them, without alternation of their mean from cell to cell. Collective.
+
+    Args:
+        model: particles in equilibrium with small displacements.
+        nmd: whether strains are averaged over nodes; else the stresses are as they are.
+    """
+    p, stress = model.particles, model.particles.stress.copy()
+    if not nmd:
+        return stress
+    normal = 2 if model.mesh.dim == 2 and model.geometry != mpm.Geometry.AXISYMMETRIC else 3
+    mean = stress[:, :normal].mean(axis=1)
+    fractions = np.array([_core.fraction_of_averaged_forces(law) for law in model.laws])[p.material]
+    stress[:, :normal] += (fractions * (model.average_over_nodes(mean) - mean))[:, None]
+    return stress
 
 
 def place_at_rest(

@@ -112,8 +112,20 @@ def test_soil_that_cannot_fail_has_no_factor_of_safety_but_a_lower_bound():
 
 
 def test_slope_that_cannot_stand_is_refused():
-    with pytest.raises(bridge.InputError, match="start.*mechanism.*smaller start"):
-        bridge.factor_of_safety(slope_model(), weight(80e3), start=1.0)
+    """It carries 3 % of this weight, and would not carry it with a strength times eight either."""
+    with pytest.raises(
+        bridge.InputError, match="start: with the strength divided by 1.0 only.*mechanism.*smaller start"
+    ):
+        bridge.factor_of_safety(slope_model(), weight(800e3), start=1.0)
+
+
+def test_a_start_that_is_too_large_is_halved():
+    """The slope carries less than a third of this weight with its strength."""
+    model = slope_model()
+    found = bridge.factor_of_safety(model, weight(80e3), start=1.0)
+    assert found.failed and found.value < 1.0 and not model.converged
+    assert found.curve[0, 0] in (0.5, 0.25, 0.125)
+    assert found.value == pytest.approx(bridge.factor_of_safety(slope_model(), weight(80e3), start=0.3).value, rel=5e-3)
 
 
 def test_more_strength_is_not_advised_where_it_would_not_help():
