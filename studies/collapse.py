@@ -21,6 +21,7 @@ from common.ranks import run_study
 from common.results import open_results
 from common.site_file import Site
 from common.site_runs import add_site_option, check_site_options, site_study
+from common.site_strength import refuse_strength_ratio
 from common.slope_fem import (
     add_fem_slope_options,
     add_ground_option,
@@ -120,7 +121,8 @@ def drawn(found: CollapseRuns, spiral: bridge.LogSpiral, folder: Path) -> Pictur
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     if a.site is not None:
-        return site_study(a, weight_factor, "collapse_weight_factor", "Factor of all unit weights [-]", at_rest=False)
+        return site_study(a, weight_factor, "collapse_weight_factor", "Factor of all unit weights [-]", at_rest=False,
+                          require=lambda site: refuse_strength_ratio(site, a.site))  # fmt: skip
     start = perf_counter()
     folder = open_results(a, comm)
     spiral = bridge.log_spiral(a.height, a.angle, a.cohesion, a.friction_angle, a.crest, depth=a.depth)

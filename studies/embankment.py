@@ -25,7 +25,7 @@ from common.page import Page
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
-from common.site_field_plots import random_pictures
+from common.site_field_plots import strength_pictures
 from common.site_file import Site, read_site
 from common.site_slides import add_strength_factor
 from common.stage_runs import add_stage_options, carry_out
@@ -63,7 +63,7 @@ def build(
 ) -> tuple[bridge.ParticleSite, str | None]:
     """Particles after all stages, and why they ended early if they did; weaker laws are there for the slide. Collective.
 
-    Where stages install structural members, or strengths are random fields, the particles begin from the finite elements, `staged`:
+    Where stages install structural members, or strengths are random fields or follow the vertical stress, the particles begin from the finite elements, `staged`:
     quasi-static ones of their own have none.
     """
     model, materials = site.model(site.weaker_laws(factor) if factor > 1 else ())
@@ -72,7 +72,9 @@ def build(
     )
     if begins_from_elements(site) and staged is not None:
         handover = particles.take_over(staged)
-        has = " and ".join(["the structural members"] * bool(site.members) + ["the random fields"] * bool(site.random))
+        parts = {"the structural members": site.members, "the random fields": site.random,
+                 "the strengths by the vertical stress": site.soils_with_strength_ratio}  # fmt: skip
+        has = " and ".join(name for name, there in parts.items() if there)
         say(
             f"the particles begin from the finite elements, which have {has}; out-of-balance ratio {handover.unbalanced_ratio:.1e}"
         )
@@ -90,7 +92,7 @@ def build(
 
 def begins_from_elements(site: Site) -> bool:
     """Whether a site has what quasi-static particles cannot have in their own stages."""
-    return bool(site.members or site.random)
+    return bool(site.members or site.random or site.soils_with_strength_ratio)
 
 
 def stress_difference(particles: bridge.ParticleSite, staged: bridge.FemSite) -> float:
@@ -164,7 +166,7 @@ def main(arguments: list[str] | None = None) -> int:
     drawn = {
         **(run.drawn(site.stages, folder) if a.pictures else {}),
         **site_slides.slide_pictures(a, result, scene, folder),
-        **(random_pictures(site, run.site.fem, folder) if a.pictures else {}),
+        **(strength_pictures(site, run.site.fem, folder) if a.pictures else {}),
     }
     slide = f"strength divided by {factor:g}" if factor > 1 else "full strength"
     movie = [particle_movie(slide, scene, result.frames)]

@@ -18,7 +18,7 @@ from common.page import Page
 from common.quiet import NOT_REACHED, without_warning
 from common.ranks import run_study
 from common.results import open_results
-from common.site_field_plots import random_pictures
+from common.site_field_plots import strength_pictures
 from common.site_file import Site, read_site
 from common.stage_flow import flow_lines
 from common.stage_runs import add_stage_options, carry_out
@@ -104,7 +104,9 @@ def main(arguments: list[str] | None = None) -> int:
     run = carry_out(site, int(a.elements[1]), folder, comm)
     compared = (
         comparison(site, run.site)
-        if a.compare and run.stopped is None and not (site.members or site.begins_at_rest)
+        if a.compare
+        and run.stopped is None
+        and not (site.members or site.begins_at_rest or site.soils_with_strength_ratio)
         else {}
     )
     last = run.rows[-1] if run.rows else {}
@@ -120,7 +122,7 @@ def main(arguments: list[str] | None = None) -> int:
                 "movements": "Largest movements after each stage", **captions(run.forces)}  # fmt: skip
     said = flow_lines(last.get("stage", ""), run.site.state.pore_pressure)
     said += [COMPARED[name].format(value) if value is not None else NOT_CARRIED for name, value in compared.items()]
-    drawn = {**run.drawn(site.stages, folder), **random_pictures(site, run.site.fem, folder)}
+    drawn = {**run.drawn(site.stages, folder), **strength_pictures(site, run.site.fem, folder)}
     return write_summary(folder, a, summary, comm, Page(captions=shown), drawn, "\n".join(said))
 
 

@@ -24,7 +24,7 @@ from common.quiet import NOT_REACHED, without_warning
 from common.ranks import run_study
 from common.results import open_results
 from common.site_file import Site
-from common.site_k0 import begin_at_rest, say_left_out
+from common.site_k0 import all_at_rest, begin_at_rest, say_left_out
 from common.site_runs import add_site_option, check_site_options, site_study
 from common.slope_case import GRAVITY, SUPPORTS, soil_of
 from common.slope_fem import (
@@ -228,15 +228,17 @@ def site_load(site: Site, model: bridge.QuasiStatic) -> bridge.Load:
 
     They are placed at once, since the factor hardly depends on stresses before failure. But soil with friction whose water does not
     drain has the strength of its effective stress when it ceases to drain: stages in which that happens are carried out, as are those of
-    a site with K0 or overconsolidation.
+    a site with K0 or overconsolidation. Of a site with strength ratios those before the last stage that gives one are.
 
     Raises:
         RunError: a stage that is carried out has no equilibrium.
     """
     undrains = any(keeps_effective_stress(law) for stage in site.stages for law in stage.law.values())
-    if not (undrains or site.begins_at_rest):
-        return bridge.FemSite(model).place(site.stages) if site.stages else site.load()
     try:
+        if site.soils_with_strength_ratio and not undrains:
+            return bridge.FemSite(model).place(site.stages or [all_at_rest(site)])
+        if not (undrains or site.begins_at_rest):
+            return bridge.FemSite(model).place(site.stages) if site.stages else site.load()
         if site.stages:
             list(bridge.carry_out(bridge.FemSite(model), site.stages))
         else:
@@ -297,6 +299,11 @@ def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     if a.site is not None:
 
+        def require(site):
+            if a.particles and site.soils_with_strength_ratio:
+                raise mpm.InputError(f"--particles: {a.site} has strength_ratio, but these particles begin without the stresses that it needs; leave "
+                                     "the option out, or follow the particles of the site by the study embankment")  # fmt: skip
+
         def factor(site, model, progress):
             unreduced = site.tags_of(a.unreduced)
             warn_of_undrained_weight(site)
@@ -312,7 +319,9 @@ def main(arguments: list[str] | None = None) -> int:
                 found |= critical_seismic(model, site_load(site, model), "site", -1 if a.seismic_coefficient < 0 else 1)
             return found
 
-        return site_study(a, factor, "factor_of_safety", "Factor of safety [-]", more, at_once=a.particles)
+        return site_study(
+            a, factor, "factor_of_safety", "Factor of safety [-]", more, at_once=a.particles, require=require
+        )
     start = perf_counter()
     folder = open_results(a, comm)
     soil = a.height, a.angle, a.cohesion, a.friction_angle, a.unit_weight

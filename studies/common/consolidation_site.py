@@ -44,6 +44,7 @@ from .site_flow import boundary_of, wet_soils
 from .site_k0 import of_soils
 from .site_keys import CHANGES, DAY, changes_of, read_site_table
 from .site_mesh import part_of_mesh
+from .site_strength import refuse_strength_ratio
 from .slope_case import GRAVITY
 from .water_site import (
     by_law,
@@ -281,6 +282,7 @@ def read_consolidation_site(
         say(f"{path}: this study leaves out {changes}")
     site = site_of(effective_laws(table), path, comm, cell_size, interfaces=True)
     site.require_no_fields(path)
+    refuse_strength_ratio(site, path)
     mesh = part_of_mesh((site.domain, site.cell_tags, site.facet_tags), soils)
     for name in pressures or {}:
         if name not in mesh[2].names:

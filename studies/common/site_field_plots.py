@@ -1,4 +1,4 @@
-"""Pictures of the random fields of a site."""
+"""Pictures of the strengths of a site that differ from point to point: random fields, and strengths that follow the vertical stress."""
 
 from __future__ import annotations
 
@@ -16,30 +16,46 @@ from particle_player import axis_labels
 from .figures import Pictures, save_figure
 from .plots import WIDTH, paper_style
 from .site_file import Site
+from .site_strength import STRENGTH
 
-LABELS = {"cohesion": ("Cohesion [kPa]", 1e-3), "friction_angle": ("Friction angle [degrees]", 1.0)}
-"""Label and scale of each parameter that may be random"""
+KINDS = {
+    "random_cohesion": ("Cohesion [kPa]", 1e-3),
+    "random_friction_angle": ("Friction angle [degrees]", 1.0),
+    "undrained_strength": ("Undrained shear strength [kPa]", 1e-3),
+}
+"""Label and scale of each picture"""
+CAPTIONS = {
+    **dict.fromkeys(("random_cohesion", "random_friction_angle"), "Strength of the soils that is a random field"),
+    "undrained_strength": "Undrained strength of the soils in which it follows the vertical effective stress",
+}
+"""Captions of the pictures"""
 
 
-def random_pictures(site: Site, fem: bridge.QuasiStatic, folder: Path) -> Pictures:
-    """Pictures of the random fields of a site on a mesh, one for each parameter; none without any. Collective."""
+def strength_pictures(site: Site, fem: bridge.QuasiStatic, folder: Path) -> Pictures:
+    """Pictures of the strengths of a site that differ from point to point, one for each parameter and kind; none without any. Collective."""
     comm, nodes = fem.domain.comm, compat.cell_nodes(fem.domain)[fem.points.cells]
     corners, pictures = fem.domain.geometry.x[nodes, :2], {}
     tags = np.array([*fem.soils, 0])[fem.points.material]  # 0, the last one, where no soil is
-    for name in dict.fromkeys(field.parameter for field in site.random):
-        soils = [field.soil for field in site.random if field.parameter == name]
+    soils_of: dict[tuple[str, str], list[str]] = {}
+    for field in site.random:
+        soils_of.setdefault((f"random_{field.parameter}", field.parameter), []).append(field.soil)
+    if follow := site.soils_with_strength_ratio:
+        soils_of["undrained_strength", STRENGTH] = follow
+    for (kind, name), soils in soils_of.items():
+        if name not in fem.points.parameters:  # no stage came as far as this
+            continue
         values = fem.points.parameters[name].reshape(len(corners), -1).mean(axis=1)
         found = comm.gather((corners, np.where(np.isin(tags, site.tags_of(soils)), values, np.nan)))
         if found is not None:
             cells, shown = (np.concatenate(parts) for parts in zip(*found))
-            path = folder / f"random_{name}.png"
-            pictures[path.stem] = partial(_save, path, cells, shown, name, site.axisymmetric)
+            path = folder / f"{kind}.png"
+            pictures[kind] = partial(_save, path, cells, shown, site.axisymmetric)
     return pictures
 
 
-def _save(path: Path, cells: np.ndarray, values: np.ndarray, name: str, half_section: bool) -> None:
+def _save(path: Path, cells: np.ndarray, values: np.ndarray, half_section: bool) -> None:
     """Draw the values of cells (m, 3, 2) [m]; those that are NaN are left grey."""
-    label, scale = LABELS[name]
+    label, scale = KINDS[path.stem]
     lower, upper = cells.min(axis=(0, 1)), cells.max(axis=(0, 1))
     height = float(np.clip(0.9 * WIDTH * (upper[1] - lower[1]) / (upper[0] - lower[0]), 0.8, 6.0))
     with paper_style():

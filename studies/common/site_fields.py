@@ -102,13 +102,13 @@ def _relative(given: Mapping[str, Any], dim: int, where: str) -> mpm.RandomField
         raise mpm.InputError(f"{where}: {error}") from None
 
 
-def varying(law: Any, fields: Sequence[SoilField]) -> Any:
-    """The law of a soil with the parameters that are fields; that of undrained soil keeps its pore water."""
-    if not fields:
+def varying(law: Any, parameters: Sequence[str]) -> Any:
+    """The law of a soil with parameters that vary from point to point; that of undrained soil keeps its pore water."""
+    if not parameters:
         return law
     if isinstance(law, mpm.Undrained):
-        return mpm.Undrained(varying(law.skeleton, fields), water_modulus=law.water_modulus, porosity=law.porosity)
-    return mpm.Heterogeneous(law, [field.parameter for field in fields])
+        return mpm.Undrained(varying(law.skeleton, parameters), water_modulus=law.water_modulus, porosity=law.porosity)
+    return mpm.Heterogeneous(law, parameters)
 
 
 def values_of(

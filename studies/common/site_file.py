@@ -45,16 +45,14 @@ import mpm_core as mpm
 
 from .checks import say
 from .hardening_doubts import k0_doubt, secant_doubt
-from .site_doubts import warn_of_depth, warn_of_pressures, warn_of_water
-from .site_fields import SoilField, fields_of, values_of, varying
+from .site_doubts import warn_of_pressures, warn_of_water
+from .site_fields import SoilField, fields_of, values_of
 from .site_interfaces import fractions_of, in_stages, split_beside, weakened
 from .site_k0 import from_the_beginning, k0_of, overconsolidation_of
-from .site_keys import CHANGES, STAGE_WATER, changes_of, member_of, part_of, read_site_table, require_push
+from .site_keys import CHANGES, STAGE_WATER, changes_of, member_of, part_of, read_site_table
 from .site_laws import (
     OVERCONSOLIDATION,
     idle_doubt,
-    is_number,
-    law_at,
     law_keys,
     left_out_doubt,
     located,
@@ -62,7 +60,9 @@ from .site_laws import (
     unit_weight_of,
 )
 from .site_mesh import check_soils, geometry_of, site_mesh
-from .site_supports import support_of, supports_of
+from .site_stages import stage_of
+from .site_strength import law_of_table, ratio_of, with_strength_ratios
+from .site_supports import supports_of
 from .slope_case import GRAVITY
 from .stage_flow import with_steady_flow
 
@@ -76,6 +76,7 @@ class Site:
     further_laws: those that come in by stages; members: structural ones by name, of stages; axisymmetric: whether it is a half section; stage_rows: stages as in the file
     random: parameters of soils that are random fields; k0: ratio of horizontal to vertical effective stress by soil, of those that have one
     overconsolidation: largest vertical effective stress before over that of the beginning by soil, of those that have one
+    strength_ratio: undrained strength over vertical effective stress of the beginning by soil, of those that have one
     """
 
     domain: Any
@@ -93,6 +94,13 @@ class Site:
     random: Sequence[SoilField] = ()
     k0: dict[str, float] = field(default_factory=dict)
     overconsolidation: dict[str, float] = field(default_factory=dict)
+    strength_ratio: dict[str, bridge.StrengthRatio] = field(default_factory=dict)
+
+    @property
+    def soils_with_strength_ratio(self) -> list[str]:
+        """Soils whose undrained strength follows the vertical effective stress, from the beginning or by the law of a stage."""
+        by_stages = (str(soil) for stage in self.stages for soil in stage.strength_ratio)
+        return list(dict.fromkeys([*self.strength_ratio, *by_stages]))
 
     @property
     def begins_at_rest(self) -> bool:
@@ -241,6 +249,7 @@ def site_of(
     check_soils(table, path, cell_tags)
     soils, laws, weights = table["soils"], {}, {}
     k0, ratios = k0_of(soils, path), overconsolidation_of(soils, path)
+    weak = {soil: ratio for soil, given in soils.items() if (ratio := ratio_of(given, f"{path}: soils.{soil}"))}
     random: list[SoilField] = []
     for soil, given in soils.items():
         where = f"{path}: soils.{soil}"
@@ -255,9 +264,9 @@ def site_of(
             cell_tags, heights = bridge.graded_tags(
                 domain, cell_tags, soil, lambda x: x[:, -1], table.get("classes", 20)
             )
-            own = {tag: varying(law_at(parameters, height, where), fields) for tag, height in heights.items()}
+            own = {tag: law_of_table(parameters, height, where, fields) for tag, height in heights.items()}
         else:
-            law = varying(law_at(parameters, None, where), fields)
+            law = law_of_table(parameters, None, where, fields)
             own = dict.fromkeys(bridge.names_of(cell_tags).get(soil, (soil,)), law)
         laws |= own
         say(unit_doubt(parameters, where, heights.values()))
@@ -267,7 +276,7 @@ def site_of(
         say(secant_doubt(one, where))
         say("" if soil in k0 else k0_doubt(one, ratios.get(soil, 1.0), where))
     others = {
-        name: law_at(located(given, path.parent), None, f"{path}: laws.{name}")
+        name: law_of_table(located(part_of(given, law_keys()), path.parent), None, f"{path}: laws.{name}")
         for name, given in table.get("laws", {}).items()
     }
     for name, given in table.get("laws", {}).items():
@@ -281,8 +290,8 @@ def site_of(
     at_once = interfaces or (interfaces is None and not rows)
     laws = weakened(laws, beside, at_once)
     site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, supports_of(table, path, domain, facet_tags), [],
-                list(others.values()), axisymmetric, rows, members, random, k0, ratios)  # fmt: skip
-    site.stages = [_stage(given, k, site, others, path) for k, given in enumerate(rows)]
+                list(others.values()), axisymmetric, rows, members, random, k0, ratios, weak)  # fmt: skip
+    site.stages = [stage_of(given, k, site, others, path) for k, given in enumerate(rows)]
     if beside.walls and not at_once:
         site.stages, further = in_stages(site.stages, laws, beside, lambda soil: site.tags_of([soil]))
         site.further_laws += further
@@ -303,6 +312,7 @@ def site_of(
             f"{path}: no stage fills the cells of {names}, which therefore hold no soil; name it in fill of a stage where it is there"
         )
     site.stages = from_the_beginning(site.stages, site, begins_later or not rows or "day" not in rows[0], path)
+    site.stages = with_strength_ratios(site.stages, site, table.get("laws", {}), path)
     return site
 
 
@@ -315,69 +325,3 @@ def _require_columns(members: Collection[str], path: Path) -> None:
             raise mpm.InputError(
                 f"{path}: members: {other!r} and {name!r} would have the same columns in tables, expected other names"
             )
-
-
-def _stage(given: dict, number: int, site: Site, laws: dict[str, Any], path: Path) -> bridge.Stage:
-    where = f"{path}: stages[{number}]"
-    for key in ("law", "unit_weight", "pressure", "support"):
-        if not isinstance(given.get(key, {}), dict):
-            raise mpm.InputError(f"{where}: {key} is {given[key]!r}, expected a table such as {key} = {{name = value}}")
-    for name, pressure in given.get("pressure", {}).items():
-        if is_number(pressure):  # others are named with the stages
-            require_push(pressure, f"{where}: pressure of {name!r}")
-    reset = given.get("reset_displacement", False)
-    if not isinstance(reset, bool):
-        raise mpm.InputError(f"{where}: reset_displacement is {reset!r}, expected true or false")
-    fill = given.get("fill", [])
-    fill = [fill] if isinstance(fill, str) else fill
-    for soil in [*fill, *given.get("law", {})]:
-        if soil not in site.unit_weight:
-            raise mpm.InputError(f"{where}: soil {soil!r} is not among the soils {', '.join(site.unit_weight)}")
-    install, remove = (_member_names(given, key, site, where) for key in ("install", "remove"))
-    for soil, law in given.get("law", {}).items():
-        if law not in laws:
-            raise mpm.InputError(
-                f"{where}: law of {soil!r} is {law!r}, expected one of [laws]: {', '.join(laws) or 'there is none'}"
-            )
-    return bridge.Stage(
-        str(given.get("name", f"stage {number + 1}")),
-        fill=fill,
-        excavate=given.get("excavate", ()),
-        law={soil: laws[law] for soil, law in given.get("law", {}).items()},
-        unit_weight={**{soil: site.unit_weight[soil] for soil in fill}, **given.get("unit_weight", {})},
-        pressure=given.get("pressure", {}),
-        support=[support_of(name, kind, f"{where}.support.{name}", site.domain, site.facet_tags)
-                 for name, kind in given.get("support", {}).items()],
-        release=given.get("release", ()),
-        pore_pressure=_water(given["water_level"], where, site.domain) if "water_level" in given else None,
-        reset_displacement=reset,
-        install={name: site.members[name] for name in install},
-        remove=remove,
-    )  # fmt: skip
-
-
-def _member_names(given: dict, key: str, site: Site, where: str) -> list[str]:
-    """Names of structural members that a stage installs or removes."""
-    names = given.get(key, [])
-    names = [names] if isinstance(names, str) else names
-    if not isinstance(names, list):
-        raise mpm.InputError(f"{where}: {key} is {names!r}, expected names of members")
-    for name in names:
-        if name not in site.members:
-            known = ", ".join(site.members) or "there is none"
-            raise mpm.InputError(f"{where}: {name!r} is not among the tables [members.NAME]: {known}")
-    return names
-
-
-def _water(level: Any, where: str, domain: Any) -> Any:
-    """Pore pressures below a water level: a number, or points (x, level) of its surface. Collective."""
-    points = level if isinstance(level, list) else [[0.0, level]]
-    good = points and all(
-        isinstance(point, list) and len(point) == 2 and all(map(is_number, point)) for point in points
-    )
-    if not good or any(after[0] < before[0] for before, after in zip(points, points[1:])):
-        raise mpm.InputError(
-            f"{where}: water_level is {level!r}, expected a number [m] or points [x, level] with x rising"
-        )
-    warn_of_depth(domain, [height for _, height in points], f"{where}: water_level")
-    return bridge.hydrostatic(np.array(level, dtype=float))

@@ -13,7 +13,7 @@ from fenics_bridge.fem.k0 import LARGEST_K0
 from fenics_bridge.fem.overconsolidation import LARGEST
 
 from .checks import say
-from .site_laws import OVERCONSOLIDATION, is_number, without_effect
+from .site_laws import OVERCONSOLIDATION, RATIO, is_number, without_effect
 
 if TYPE_CHECKING:
     from .site_file import Site
@@ -49,7 +49,10 @@ def overconsolidation_of(soils: Mapping[str, Mapping[str, Any]], path: Path) -> 
             raise mpm.InputError(
                 f"{path}: soils.{soil}: {OVERCONSOLIDATION} is {value!r}, expected a ratio from 1 to {LARGEST:g}, such as 2"
             )
-    return {soil: value for soil, value in found.items() if OVERCONSOLIDATION not in without_effect(soils[soil])}
+    without_ratio = {soil: {key: value for key, value in soils[soil].items() if key != RATIO} for soil in found}
+    return {
+        soil: value for soil, value in found.items() if OVERCONSOLIDATION not in without_effect(without_ratio[soil])
+    }
 
 
 def from_the_beginning(
@@ -108,10 +111,14 @@ def begin_at_rest(site: Site, fem: bridge.QuasiStatic) -> None:
     Raises:
         StageError: there is no equilibrium.
     """
+    bridge.FemSite(fem).carry_out(all_at_rest(site))
+
+
+def all_at_rest(site: Site) -> bridge.Stage:
+    """A stage that brings all soils of a site at once, those with K0 at rest; its members are there where it has no stages."""
     members = {} if site.stages else site.members
-    stage = bridge.Stage("all at once", site.soils, unit_weight=site.unit_weight, k0=site.k0, install=members,
-                         overconsolidation=site.overconsolidation)  # fmt: skip
-    bridge.FemSite(fem).carry_out(stage)
+    return bridge.Stage("all at once", site.soils, unit_weight=site.unit_weight, k0=site.k0, install=members,
+                        overconsolidation=site.overconsolidation, strength_ratio=site.strength_ratio)  # fmt: skip
 
 
 def say_left_out(k0: Mapping[str, Any], overconsolidation: Mapping[str, Any], where: str) -> None:

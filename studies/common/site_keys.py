@@ -106,7 +106,7 @@ def _extended(path: Path, files: list[dict[str, Any]]) -> dict[str, Any]:
     _require_known(table, KEYS, str(path))
     for key, known in (
         ("soils", (*FLOW, "unit_weight", K0, OVERCONSOLIDATION, *law_keys())),
-        ("laws", law_keys()),
+        ("laws", (OVERCONSOLIDATION, *law_keys())),
         ("boundaries", WATER),
     ):
         for name, given in _table_at(table, key, str(path)).items():

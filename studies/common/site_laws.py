@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from fenics_bridge.fem.strength_ratio import LARGEST_RATIO
 from mpm_core.input_warnings import soft_water
 
 import mpm_core as mpm
@@ -25,6 +26,10 @@ KINDS = ("material", "python_law", "umat")
 """Keys that say which law it is; the last one that a table has does"""
 OVERCONSOLIDATION = "overconsolidation"
 """Key of a soil whose law remembers the largest stress that it has carried"""
+RATIO, EXPONENT = "strength_ratio", "strength_exponent"
+"""Keys of a law without friction whose undrained strength follows the vertical effective stress"""
+COHESIVE = ("tresca", "mohr-coulomb", "viscoplastic")
+"""Materials that may have a strength ratio"""
 OF_UMAT = ("properties", "strength_properties", "variables")
 
 
@@ -35,6 +40,10 @@ def _parser() -> argparse.ArgumentParser:
     add_law_options(parser)
     add_number(
         parser, "--shear-strength", None, "Pa", "undrained shear strength, for tresca: instead of cohesion", at_least=0
+    )
+    add_number(parser, "--strength-ratio", None, "-", "undrained strength ratio", above=0, at_most=LARGEST_RATIO)
+    add_number(
+        parser, "--strength-exponent", 0.8, "-", "exponent of the overconsolidation ratio", at_least=0, at_most=1
     )
     return parser
 
@@ -80,6 +89,12 @@ def law_at(table: dict, height: float | None, where: str) -> Any:
         raise mpm.InputError(f"{error}{place}" if isinstance(error, ParameterError) else f"{where}: {error}") from None
     if values["shear_strength"] is not None:
         values["cohesion"] = values["shear_strength"]
+    if has_ratio(table):
+        if table.get("friction_angle", 0) != 0:
+            raise mpm.InputError(
+                f"{where} has {RATIO} and friction_angle = {table['friction_angle']}, expected one of them"
+            )
+        values["friction_angle"] = values["dilation_angle"] = 0.0
     try:
         return law_of(argparse.Namespace(**values))
     except mpm.InputError as error:
@@ -92,6 +107,11 @@ def _kind_of(table: Mapping[str, Any]) -> str:
     return own or table.get("material", MATERIALS[0])
 
 
+def has_ratio(table: Mapping[str, Any]) -> bool:
+    """Whether the undrained strength of the law in a table follows the vertical effective stress."""
+    return RATIO in table and _kind_of(table) in COHESIVE
+
+
 def without_effect(table: Mapping[str, Any]) -> list[str]:
     """Keys in the table of a law that have no effect on it."""
     kind = _kind_of(table)
@@ -101,7 +121,8 @@ def without_effect(table: Mapping[str, Any]) -> list[str]:
     idle = idle - {"young", "poisson"} if kind == "umat" else idle | set(OF_UMAT)
     idle |= set(KINDS) - {kind} if kind in KINDS else set()
     idle |= set() if table.get("undrained", False) else {"water_modulus"}
-    idle |= set() if kind == "hardening-soil" else {OVERCONSOLIDATION}
+    idle |= set() if has_ratio(table) else {RATIO, EXPONENT}
+    idle |= set() if kind == "hardening-soil" or has_ratio(table) else {OVERCONSOLIDATION}
     return [key for key in table if key in idle]
 
 
@@ -149,7 +170,9 @@ def left_out_doubt(table: Mapping[str, Any], where: str) -> str:
         table: parameters of the law.
         where: it stands in the file.
     """
-    given = {"cohesion" if key in STRENGTHS else key for key in table}
+    given = {"cohesion" if key in STRENGTHS else key for key in table} | (
+        {"friction_angle"} if has_ratio(table) else set()
+    )
     missing = [key for key in needed_keys(_kind_of(table)) if key not in given]
     if not missing:
         return ""

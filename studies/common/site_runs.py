@@ -21,7 +21,8 @@ from .figures import Pictures
 from .page import Page
 from .quiet import NOT_REACHED, without_warning
 from .results import open_results
-from .site_field_plots import random_pictures
+from .site_field_plots import CAPTIONS as STRENGTHS
+from .site_field_plots import strength_pictures
 from .site_file import Site, read_site
 from .site_k0 import say_left_out
 from .site_mesh import cell_size_of
@@ -61,6 +62,7 @@ def site_study(
     more: Callable[[Site], dict] = lambda site: {},
     at_once: bool = True,
     at_rest: bool = True,
+    require: Callable[[Site], None] = lambda site: None,
 ) -> int:
     """A study on a site instead of the slope; returns its exit code. Collective.
 
@@ -71,11 +73,13 @@ def site_study(
         more: function of the site on the finest mesh that returns further entries of the summary.
         at_once: whether anything of it has all soils at once, without what stages change, so that a warning is due.
         at_rest: whether the value is found from the stresses by K0 and overconsolidation; else a warning is due.
+        require: function of the site that raises InputError where the study does not have what it needs, before there are results.
     """
     comm, start = MPI.COMM_WORLD, perf_counter()
     finest = a.cell_size or cell_size_of(a.site)
     sizes = [finest * 2**k for k in reversed(range(a.meshes))] if finest else [None]
     site, runs = read_site(a.site, comm, sizes[0]), []
+    require(site)
     folder = open_results(a, comm)
     if not at_rest:
         say_left_out(site.k0, site.overconsolidation, str(a.site))
@@ -94,7 +98,7 @@ def site_study(
     summary = {name: runs[-1].value, "failed_at": runs[-1].failed_at, **more(site),
                "failure_shown": runs[-1].failed, "meshes": rows, "curve_value": runs[-1].curve[:, 0],
                "curve_largest_displacement_m": runs[-1].curve[:, 1], "wall_seconds": perf_counter() - start}  # fmt: skip
-    drawn = {**_drawn(folder, sizes, runs, label, site, model), **random_pictures(site, model, folder)}
+    drawn = {**_drawn(folder, sizes, runs, label, site, model), **strength_pictures(site, model, folder)}
     said = []
     for row in rows:
         sure = "" if row["failure_shown"] else f", a lower bound only: {row['reason']}"
@@ -104,7 +108,7 @@ def site_study(
     captions = {"mechanism": "Mechanism on the finest mesh, with the soils and, where there is water, the water table",
                 "value_displacement": f"{value} over the largest displacement on the way to failure",
                 "convergence": f"{value} over the size of the cells",
-                **{name: "Strength of the soils that is a random field" for name in drawn if name.startswith("random_")}}  # fmt: skip
+                **STRENGTHS}  # fmt: skip
     write_summary(folder, a, summary, comm, Page(captions=captions), drawn, "\n".join(said))
     return 0 if all(run.failed for run in runs) else UNDECIDED
 

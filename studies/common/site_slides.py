@@ -35,7 +35,7 @@ from .quiet import NOT_REACHED, without_warning
 from .results import open_results
 from .scenes import scene_of
 from .schemes import add_particles_per_cell, add_pic
-from .site_field_plots import random_pictures
+from .site_field_plots import strength_pictures
 from .site_file import Site, read_site
 from .site_k0 import begin_at_rest
 from .summary import write_summary
@@ -197,7 +197,7 @@ def site_slide(a: Namespace) -> int:
     fem = site.finite_elements(1, nmd=nmd, solver=bridge.Solver(tolerance=1e-10), as_particles=nmd)
     with without_warning(NOT_REACHED):  # said by the error
         _carry_weight(site, fem, a.site)
-    random = random_pictures(site, fem, folder) if a.pictures else {}
+    random = strength_pictures(site, fem, folder) if a.pictures else {}
     model = site.particles(a.particles_per_cell, more=site.weaker_laws(a.factor))
     handover = bridge.initialise(model, fem, count_displacement=False, nmd=nmd, equilibrate=not fem.members)
     model.assign(model.particles.material + len(site.laws))

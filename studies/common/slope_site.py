@@ -27,6 +27,7 @@ from .site_file import Site, site_of
 from .site_flow import boundary_of, wet_soils
 from .site_k0 import k0_of, overconsolidation_of, say_left_out
 from .site_keys import CHANGES, changes_of
+from .site_strength import refuse_strength_ratio
 from .water_site import corners_of, effective_laws, read_water_table, standing_load, times_of
 
 
@@ -134,6 +135,7 @@ def read_slope_site(path: Path, comm: MPI.Comm, cell_size: float | None = None, 
     say_left_out(k0_of(table["soils"], path), overconsolidation_of(table["soils"], path), str(path))
     boundary = [_slower(one, slower) for one in boundary_of(table, path).values()]
     site = site_of(effective_laws(table), path, comm, cell_size, interfaces=False)
+    refuse_strength_ratio(site, path)
     body = site.body()
     warn_of_reservoirs(body[0], boundary, path)
     warn_of_flooded_ground(body[0], body[2], boundary, path)

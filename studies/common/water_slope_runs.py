@@ -22,7 +22,7 @@ from .page import Page
 from .quiet import NOT_REACHED, without_warning
 from .results import open_results
 from .site_doubts import ends_of_height, warn_of_suction
-from .site_field_plots import random_pictures
+from .site_field_plots import strength_pictures
 from .site_slides import CAPTIONS as SLIDE_CAPTIONS
 from .slope_site import SlopeSite, read_slope_site
 from .summary import write_summary
@@ -97,7 +97,7 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
     lines += filter(None, [rests_all_the_same(a, slope, summary)])
     drawn = (slope_pictures(folder, instants, values, slope.body[1], a.film) | pictures) if a.pictures else {}
     if a.pictures and slope.site.random:
-        drawn |= random_pictures(slope.site, slope.elements(1, lambda points: np.zeros(len(points))), folder)
+        drawn |= strength_pictures(slope.site, slope.elements(1, lambda points: np.zeros(len(points))), folder)
     early = write_summary(folder, a, summary, comm, page, drawn, said="\n".join(lines))
     return early or code or (0 if shown else UNDECIDED)
 

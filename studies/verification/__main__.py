@@ -46,6 +46,7 @@ GROUPS = {
         "pipe_factor",
         "pushed_footing",
         "retaining_wall",
+        "strength_ratio",
         "weak_layer",
         "weak_plane",
     ),

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import study_main
-from common.site_field_plots import random_pictures
+from common.site_field_plots import strength_pictures
 from common.site_file import read_site
 from mpi4py import MPI
 
@@ -159,4 +159,4 @@ def test_studies_without_random_fields_refuse_them(tmp_path):
 
 def test_a_site_without_random_fields_has_no_picture_of_one(tmp_path):
     site = read_site(site_in(tmp_path, ""), MPI.COMM_WORLD)
-    assert random_pictures(site, site.finite_elements(1), tmp_path) == {}
+    assert strength_pictures(site, site.finite_elements(1), tmp_path) == {}

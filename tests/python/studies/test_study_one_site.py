@@ -284,8 +284,8 @@ WEAK = ("cohesion = 10e3", "cohesion = 0.5e3"), ("friction_angle = 24.0", "frict
     [
         ("slope", "", "its soils carry"),
         ("excavation", "", "has no equilibrium beyond"),
-        ("safety", "--start 3", "start: with the strength divided by 3.0 only"),
-        ("drawdown", "--start 3", "start: with the strength divided by 3.0 only"),
+        ("safety", "--start 100", "start: with the strength divided by 100.0 only"),
+        ("drawdown", "--start 100", "start: with the strength divided by 100.0 only"),
     ],
 )
 def test_why_the_ground_fails_is_said_once(study, options, words, tmp_path):
