@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from mpm_core.parameter_fields import differences_of
 from numpy.typing import NDArray
 
 import mpm_core as mpm
@@ -264,14 +265,15 @@ class ParticleSite:
         laws: Mapping[int, Any],
     ) -> None:
         """Give the particles of soils the undrained strength of strength ratios, by tag, under vertical stresses of `_vertical_stress`."""
-        ids = self.model.particles.id
-        values = np.full(len(ids), np.nan)
+        if not ratios:
+            return
+        p = self.model.particles
+        values = np.full(len(p), np.nan)  # others keep theirs
         for tag, ratio in ratios.items():
             of_soil, stress = vertical[tag]
-            rows = np.flatnonzero(np.isin(ids, of_soil))
-            values[rows] = strengths(laws[tag], ratio, stress)[np.searchsorted(of_soil, ids[rows])]
-        if ratios:
-            self.model.set_parameter(STRENGTH, values)
+            rows = np.flatnonzero(np.isin(p.id, of_soil))
+            values[rows] = strengths(laws[tag], ratio, stress)[np.searchsorted(of_soil, p.id[rows])]
+        p.set("state", differences_of(STRENGTH, values, self.model.laws, p.material, p.state))
 
     def _harden(self, ratios: Mapping[int, float]) -> None:
         """Give the particles of soils the hardening of overconsolidation ratios [-], by tag, under their present stresses."""

@@ -92,6 +92,12 @@ def test_particles_in_stages_are_the_same_on_all_numbers_of_ranks(folder):
     assert all(np.abs(together[i] - alone[i]).max() < 1e-8 * largest for i in alone)
 
 
+def in_order(comm, ids, values):
+    """Values of the particles of all ranks in the order of their numbers."""
+    numbers, rows = (np.concatenate(parts) for parts in zip(*comm.allgather((ids, values))))
+    return rows[np.argsort(numbers)]
+
+
 K0 = dict(zip(SOILS["pit"], (1.2, 0.5, 4.0)))
 
 
@@ -111,10 +117,7 @@ def test_stresses_by_k0_are_the_same_on_all_numbers_of_ranks(folder):
         particles = bridge.ParticleSite(model, numbers, ROLLERS, tolerance=1e-8, small_displacements=True)
         particles.carry_out(stage)
         p = model.particles
-        rows = [pair for ids, stress in comm.allgather((p.id, p.stress)) for pair in zip(ids.tolist(), stress)]
-        values.append(
-            (fem.fem.evaluate_at(POINTS)["stress"], np.array([row for _, row in sorted(rows, key=lambda r: r[0])]))
-        )
+        values.append((fem.fem.evaluate_at(POINTS)["stress"], in_order(comm, p.id, p.stress)))
     for together, alone in zip(*values):
         assert np.abs(together - alone).max() < 1e-8 * np.abs(alone).max()
 
@@ -143,12 +146,43 @@ def test_overconsolidation_is_the_same_on_all_numbers_of_ranks(folder):
         for site in (fem, particles):
             list(bridge.carry_out(site, stages))
         p = model.particles
-        rows = [pair for ids, state in comm.allgather((p.id, p.state)) for pair in zip(ids.tolist(), state)]
         found = fem.fem.evaluate_at(POINTS)
-        values.append((found["state"], found["stress"], np.array([row for _, row in sorted(rows, key=lambda r: r[0])])))
+        values.append((found["state"], found["stress"], in_order(comm, p.id, p.state)))
     for together, alone in zip(*values):
         assert np.abs(together - alone).max() < 1e-7 * np.abs(alone).max()
     site = site_of(mesh_of("pit", folder), plastic(SOILS["pit"]), degree=1)
     with pytest.raises(bridge.InputError, match="'ground', whose law is MohrCoulomb, expected HardeningSoil") as error:
+        site.carry_out(stages[0])
+    assert len(set(COMM.allgather(str(error.value)))) == 1
+
+
+def test_strength_ratios_are_the_same_on_all_numbers_of_ranks(folder):
+    """Of averaged linear elements and of particles, by K0 and by the stresses of a stage; another law is an error on all ranks."""
+    apart = folder / f"rank {COMM.rank}"
+    apart.mkdir()
+    clay = mpm.Heterogeneous(mpm.tresca(young=20e6, poisson=0.4, shear_strength=5e3), ["cohesion"])
+    ratio, soils = bridge.StrengthRatio(0.3, overconsolidation=2.0), SOILS["pit"]
+    stages = [
+        bridge.Stage("in situ", fill=soils, unit_weight=weights(soils), k0=dict.fromkeys(soils, 0.8),
+                     strength_ratio=dict.fromkeys(soils[1:], ratio), pore_pressure=bridge.hydrostatic(2.0)),
+        bridge.Stage("undrained", law={"ground": clay}, strength_ratio={"ground": ratio}),
+    ]  # fmt: skip
+    laws = plastic(soils) | dict.fromkeys(soils[1:], clay)
+    values = []
+    for place, comm in ((folder, COMM), (apart, MPI.COMM_SELF)):
+        mesh = mesh_of("pit", place, comm)
+        fem = site_of(mesh, laws, degree=1, nmd=True)
+        model = mpm.Model(bridge.background_mesh(*mesh), [laws["ground"], clay])
+        numbers = {soil: int(law is clay) for soil, law in laws.items()}
+        particles = bridge.ParticleSite(model, numbers, ROLLERS, tolerance=1e-8, small_displacements=True, nmd=True)
+        for site in (fem, particles):
+            list(bridge.carry_out(site, stages))
+        p = model.particles
+        values.append((fem.fem.evaluate_at(POINTS)["state"], in_order(comm, p.id, p.state)))
+    for together, alone in zip(*values):
+        assert alone[:, -1].max() > 10e3
+        assert np.abs(together - alone).max() < 1e-7 * np.abs(alone).max()
+    site = site_of(mesh_of("pit", folder), plastic(soils), degree=1)
+    with pytest.raises(bridge.InputError, match="the law of the soil 'pit 1' is MohrCoulomb, expected one") as error:
         site.carry_out(stages[0])
     assert len(set(COMM.allgather(str(error.value)))) == 1
