@@ -252,7 +252,7 @@ class QuasiStatic(ReinforcedBody, WetBody, SupportedBody, PointFunctions):
         self.load = load
 
     def set_parameter(self, name: str, values: Field | dict[int | str, float]) -> None:
-        """Give the points their values of a law's parameter that varies, in all laws that are `Heterogeneous` in it. Collective.
+        """Give the points their values of a law's parameter that varies, in laws `Heterogeneous` in it; see `mpm.Model.set_parameter`. Collective.
 
         Where the law of a point changes, the point keeps its values. They go to the particles at the hand-over.
 

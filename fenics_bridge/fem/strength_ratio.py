@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 from mpm_core.law_warnings import with_inner_laws
-from mpm_core.parameter_fields import has_varying, heterogeneous_part
+from mpm_core.parameter_fields import has_varying, nominal_value
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.errors import InputError, agree, is_finite
@@ -25,6 +25,8 @@ LARGEST_RATIO = 2.0
 @dataclass(frozen=True)
 class StrengthRatio:
     """Undrained shear strength over vertical effective stress: s_u = ratio * sigma_v' * OCR^exponent, at least the cohesion of the law.
+
+    It is the peak strength of SofteningMohrCoulomb, whose residual strength stays in proportion to it.
 
     SHANSEP (Ladd and Foott 1974, J. Geotech. Eng. Div. ASCE 100, 763-786). Without overconsolidation it is also the strength after liquefaction
     of loose sand and tailings, s_u / sigma_v' = 0.03 to 0.12 (Olson and Stark 2002, Can. Geotech. J. 39, 629-647).
@@ -76,9 +78,7 @@ def require_cohesive(
         InputError: the law of a soil has another strength. Raised on all ranks alike.
     """
     wrong = next((tag for tag in soils if not is_cohesive(laws[tag])), None)
-    expected = (
-        f"expected one without friction whose {STRENGTH} varies, such as Heterogeneous(tresca(...), [{STRENGTH!r}])"
-    )
+    expected = f"expected one without friction whose {STRENGTH} varies: Heterogeneous(tresca(...), [{STRENGTH!r}]) or SofteningMohrCoulomb"
     agree(
         comm,
         None
@@ -89,8 +89,8 @@ def require_cohesive(
 
 def is_cohesive(law: Law) -> bool:
     """Whether the strength of a law is a cohesion that varies from point to point, and nothing else."""
-    innermost = list(with_inner_laws(law))[-1]
-    return has_varying(law, STRENGTH) and getattr(innermost, "friction_angle", 0.0) == 0
+    angles = (getattr(one, "friction_angle", 0.0) for one in with_inner_laws(law))
+    return has_varying(law, STRENGTH) and not any(angles)
 
 
 def vertical_stress(law: Law, stress: NDArray[np.float64], state: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -112,6 +112,4 @@ def strengths(law: Law, ratio: StrengthRatio, vertical: NDArray[np.float64]) -> 
         ratio: strength ratio.
         vertical: vertical effective stress [Pa], compression positive, shape (n,).
     """
-    part = heterogeneous_part(law)
-    assert part is not None
-    return np.maximum(ratio(vertical), part.law.cohesion)
+    return np.maximum(ratio(vertical), nominal_value(law, STRENGTH))

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from mpm_core.parameter_fields import has_varying, nominal_value
 from numpy.typing import NDArray
 
 import mpm_core as mpm
@@ -104,7 +105,7 @@ def _relative(given: Mapping[str, Any], dim: int, where: str) -> mpm.RandomField
 
 def varying(law: Any, parameters: Sequence[str]) -> Any:
     """The law of a soil with parameters that vary from point to point; that of undrained soil keeps its pore water."""
-    if not parameters:
+    if all(has_varying(law, name) for name in parameters):
         return law
     if isinstance(law, mpm.Undrained):
         return mpm.Undrained(varying(law.skeleton, parameters), water_modulus=law.water_modulus, porosity=law.porosity)
@@ -116,18 +117,24 @@ def values_of(
     positions: NDArray[np.float64],
     tags: NDArray[Any],
     tags_of: Callable[[list[str]], list[int]],
+    laws: Mapping[int, Any],
 ) -> dict[str, NDArray[np.float64]]:
-    """Values of all random parameters at points, by name; in other soils, whose laws do not ask for them, 1.
+    """Values of all random parameters at points, by name; in other soils those of their laws, or 1 where these do not ask for them.
 
     Args:
         fields: of all soils.
         positions: [m], shape (n, D).
         tags: the tag of each point's soil, shape (n,).
         tags_of: function of names of soils that gives their tags.
+        laws: laws by tag.
     """
     values: dict[str, NDArray[np.float64]] = {}
+    for name in dict.fromkeys(field.parameter for field in fields):
+        values[name] = np.ones(len(positions))
+        for tag, law in laws.items():
+            if has_varying(law, name):
+                values[name][tags == tag] = nominal_value(law, name)
     for field in fields:
         rows = np.flatnonzero(np.isin(tags, tags_of([field.soil])))
-        found = values.setdefault(field.parameter, np.ones(len(positions)))
-        found[rows] = field(positions[rows])
+        values[field.parameter][rows] = field(positions[rows])
     return values

@@ -138,7 +138,8 @@ class Site:
     def vary(self, fem: bridge.QuasiStatic, laws: dict[int, Any]) -> None:
         """Give the points of elements with these laws by cell tag the values of random fields. Collective."""
         of_point = np.repeat(np.array(list(laws))[fem.points.material], fem.points.per_cell)
-        for name, values in values_of(self.random, fem.points.coordinates(), of_point, self.tags_of).items():
+        places = fem.points.coordinates()
+        for name, values in values_of(self.random, places, of_point, self.tags_of, laws).items():
             fem.set_parameter(name, values)
 
     def body(self) -> tuple[Any, Any, Any]:
@@ -167,7 +168,8 @@ class Site:
             for tag in mesh.tags_of("cell", soil):
                 model.seed(density=weight / GRAVITY, per_cell=per_cell, cell_tag=tag, material=number[tag])
         p = model.particles
-        for name, values in values_of(self.random, p.position, np.array(list(laws))[p.material], self.tags_of).items():
+        of_particle = np.array(list(laws))[p.material]
+        for name, values in values_of(self.random, p.position, of_particle, self.tags_of, laws).items():
             model.set_parameter(name, values)
         bridge.apply_supports(model, self.supports)
         model.set_gravity([0.0] * (mesh.dim - 1) + [-GRAVITY])

@@ -28,7 +28,7 @@ OVERCONSOLIDATION = "overconsolidation"
 """Key of a soil whose law remembers the largest stress that it has carried"""
 RATIO, EXPONENT = "strength_ratio", "strength_exponent"
 """Keys of a law without friction whose undrained strength follows the vertical effective stress"""
-COHESIVE = ("tresca", "mohr-coulomb", "viscoplastic")
+COHESIVE = ("tresca", "mohr-coulomb", "viscoplastic", "softening")
 """Materials that may have a strength ratio"""
 OF_UMAT = ("properties", "strength_properties", "variables")
 
@@ -170,9 +170,8 @@ def left_out_doubt(table: Mapping[str, Any], where: str) -> str:
         table: parameters of the law.
         where: it stands in the file.
     """
-    given = {"cohesion" if key in STRENGTHS else key for key in table} | (
-        {"friction_angle"} if has_ratio(table) else set()
-    )
+    given = {"cohesion" if key in STRENGTHS else key for key in table}
+    given |= {"friction_angle", "residual_friction_angle"} if has_ratio(table) else set()
     missing = [key for key in needed_keys(_kind_of(table)) if key not in given]
     if not missing:
         return ""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._core import Hencky, Heterogeneous, InputError, Undrained
+from ._core import Hencky, Heterogeneous, InputError, SofteningMohrCoulomb, Undrained
 from .checks import count, real_numbers
 from .mesh import Tag, floats
 
@@ -16,24 +16,40 @@ Field = float | ArrayLike | Callable[[NDArray[np.float64]], ArrayLike] | Mapping
 """Values of a parameter as they may be given, see `Model.set_parameter`"""
 
 
-def heterogeneous_part(law: Any) -> Heterogeneous | None:
-    """The `Heterogeneous` law that a law is or contains; None if there is none."""
+DEVIATION = "cohesion_deviation"
+"""State variable of `SofteningMohrCoulomb`: the relative deviation of a point's cohesion, peak and residual"""
+
+
+def _core_part(law: Any) -> Any:
+    """The law that `Hencky` and `Undrained` are made of."""
     while isinstance(law, (Hencky, Undrained)):
         law = law.law if isinstance(law, Hencky) else law.skeleton
-    return law if isinstance(law, Heterogeneous) else None
+    return law
+
+
+def varying_of(law: Any) -> Sequence[str]:
+    """Names of the parameters of a law that vary from point to point: those of `Heterogeneous`, and the cohesion of `SofteningMohrCoulomb`."""
+    part = _core_part(law)
+    return part.varying if isinstance(part, Heterogeneous) else ["cohesion"] * isinstance(part, SofteningMohrCoulomb)
 
 
 def has_varying(law: Any, name: str) -> bool:
     """Whether a parameter of a law varies from point to point."""
-    part = heterogeneous_part(law)
-    return part is not None and name in part.varying
+    return name in varying_of(law)
 
 
 def nominal_value(law: Any, name: str) -> float:
     """The nominal value of a parameter that varies."""
-    part = heterogeneous_part(law)
-    assert part is not None
-    return getattr(part.law, name)
+    part = _core_part(law)
+    return part.peak.cohesion if isinstance(part, SofteningMohrCoulomb) else getattr(part.law, name)
+
+
+def values_from(law: Any, name: str, state: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values (n,) of a parameter that varies, from the states (n, number of states) of points of the law."""
+    nominal = nominal_value(law, name)
+    if isinstance(_core_part(law), SofteningMohrCoulomb):
+        return nominal * (1 + state[:, law.state_names.index(DEVIATION)])
+    return nominal + state[:, law.state_names.index(f"{name}_difference")]
 
 
 def parameter_values(
@@ -81,21 +97,40 @@ def differences_of(
     """
     numbers = [k for k, law in enumerate(laws) if has_varying(law, name)]
     if not numbers:
-        known = [one for law in laws if (part := heterogeneous_part(law)) for one in part.varying]
+        known = [one for law in laws for one in varying_of(law)]
         has = ", ".join(dict.fromkeys(known)) or "no parameter; make the law Heterogeneous(law, [names])"
         raise InputError(f"name is '{name!s}', but what varies in the laws is {has}")
     new = state.copy()
     for number in numbers:
         law, rows = laws[number], np.flatnonzero((material == number) & ~np.isnan(values))
-        part, first = heterogeneous_part(law), law.state_names.index(f"{name}_difference")
-        assert part is not None
-        new[rows, first] = values[rows] - nominal_value(law, name)
+        part, nominal = _core_part(law), nominal_value(law, name)
+        if isinstance(part, SofteningMohrCoulomb):
+            new[rows, law.state_names.index(DEVIATION)] = _deviations(name, values[rows], nominal)
+            continue
+        first = law.state_names.index(f"{name}_difference")
+        new[rows, first] = values[rows] - nominal
         first -= part.varying.index(name)
         try:
             part.check_points(np.ascontiguousarray(new[rows, first : first + len(part.varying)]))
         except InputError as error:  # the value may be one of another parameter, which does not fit to those given
             raise InputError(str(error) if name in str(error) else f"with the values of {name}, {error}") from None
     return new
+
+
+def _deviations(name: str, values: NDArray[np.float64], nominal: float) -> NDArray[np.float64]:
+    """Values of the cohesion of points over that of their law, less 1.
+
+    Raises:
+        InputError: a value below 0, or a law without cohesion, to which none is relative.
+    """
+    if not nominal > 0:
+        raise InputError(
+            f"{name} of the law SofteningMohrCoulomb is {nominal:g} Pa, expected more than 0: points have values in proportion to it"
+        )
+    wrong = values[values < 0]
+    if len(wrong):
+        raise InputError(f"{name} = {wrong[0]:g} of a point, expected at least 0 [Pa]")
+    return values / nominal - 1
 
 
 class RandomField:

@@ -12,7 +12,7 @@ from ._core import InputError
 from .checks import real_numbers
 from .collective import collectively
 from .mesh import Mesh, floats
-from .parameter_fields import Field, differences_of, has_varying, nominal_value, parameter_values
+from .parameter_fields import Field, differences_of, has_varying, parameter_values, values_from
 from .particles import Particles
 
 
@@ -93,12 +93,13 @@ class ParticleValues:
         for number, law in enumerate(self.laws):
             if has_varying(law, name):
                 rows = self.particles.material == number
-                column = law.state_names.index(f"{name}_difference")
-                values[rows] = nominal_value(law, name) + self.particles.state[rows, column]
+                values[rows] = values_from(law, name, self.particles.state[rows])
         return values
 
     def set_parameter(self, name: str, values: Field) -> None:
         """Give particles their values of a law's parameter that varies, in all laws that are `Heterogeneous` in it.
+
+        The cohesion of `SofteningMohrCoulomb` varies as well, and its residual cohesion in proportion.
 
         Particles keep their values as they move. Give values after the particles are there; those seeded later have the
         number of their law.

@@ -125,6 +125,30 @@ def test_stresses_of_the_drained_soil_are_brought_back_to_the_strength(ground):
     assert stress[:, 1] - stress[:, 0] == pytest.approx(2 * 0.175 * stress[:, 1], rel=1e-6)
 
 
+def test_softening_clay_has_it_as_its_peak_and_keeps_its_sensitivity(ground):
+    """By elements and particles; cohesion and residual cohesion of the law are its least strength and its sensitivity, 4."""
+    peak = mpm.MohrCoulomb(young=10e6, poisson=0.45, cohesion=LEAST, friction_angle=0.0)
+    law = mpm.SofteningMohrCoulomb(
+        peak, residual_cohesion=LEAST / 4, residual_friction_angle=0.0, softening_strain=0.1, reference_length=0.5
+    )
+    stage = bridge.Stage("undrained", law={SOIL: law}, strength_ratio={SOIL: RATIO})
+    site = site_of(ground, {SOIL: DRAINED}, degree=2)
+    carried_out(site, beginning(), stage)
+    points = site.fem.points
+    strength = expected(HEIGHT - points.coordinates()[:, 1], 0.0)
+    deviation = points.state[:, law.state_names.index("cohesion_deviation")]
+    assert LEAST * (1 + deviation) == pytest.approx(strength, rel=1e-6)
+    weakest = law.softened(np.inf, float(deviation.max())).cohesion
+    assert weakest == pytest.approx(strength.max() / 4, rel=1e-6)
+    own = particles_of(ground, [DRAINED, law], {SOIL: 0})
+    linear = site_of(ground, {SOIL: DRAINED}, degree=1)
+    for each in (own, linear):
+        carried_out(each, beginning(), stage)
+    p = own.model.particles
+    found = linear.fem.evaluate_at(p.position)["state"][:, law.state_names.index("cohesion_deviation")]
+    assert own.model.parameter("cohesion") == pytest.approx(LEAST * (1 + found), rel=1e-5)
+
+
 @pytest.mark.parametrize("degree, cell_size, tolerance", [(1, 0.75, 5e-3), (2, 0.9, 2e-3)])
 def test_a_cut_in_normally_consolidated_clay_has_a_factor_that_no_weight_changes(degree, cell_size, tolerance):
     """Gibson and Morgenstern (1962): as with s_u in proportion to the depth, whose factor is the same under any weight.

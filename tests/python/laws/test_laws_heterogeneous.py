@@ -137,6 +137,35 @@ def test_strength_from_the_stress_at_the_start():
     assert model.parameter("cohesion") == pytest.approx(5e3 * (1 - model.particles.position[:, 1]))
 
 
+@pytest.mark.parametrize("wrap", [lambda law: law, mpm.Hencky, lambda law: mpm.Undrained(law, porosity=0.4)])
+def test_the_cohesion_of_softening_soil_varies_with_its_residual_one(wrap):
+    soft = mpm.SofteningMohrCoulomb(
+        mpm.MohrCoulomb(**SOIL),
+        residual_cohesion=2e3,
+        residual_friction_angle=20.0,
+        softening_strain=0.1,
+        reference_length=0.1,
+    )
+    model = layered_model(wrap(soft))
+    assert (model.parameter("cohesion") == 10e3).all()
+    model.set_parameter("cohesion", lambda x: 5e3 + 20e3 * x[:, 1])
+    expected = 5e3 + 20e3 * model.particles.position[:, 1]
+    assert model.parameter("cohesion") == pytest.approx(expected)
+    deviation = float(model.state("cohesion_deviation")[0])
+    assert soft.softened(0.0, deviation).cohesion == pytest.approx(expected[0])
+    assert soft.softened(np.inf, deviation).cohesion == pytest.approx(expected[0] / 5)
+    with pytest.raises(mpm.InputError, match="cohesion = -1 of a point, expected at least 0"):
+        model.set_parameter("cohesion", -1.0)
+    with pytest.raises(mpm.InputError, match="name is 'friction_angle', but what varies in the laws is cohesion"):
+        model.set_parameter("friction_angle", 20.0)
+    without = mpm.SofteningMohrCoulomb(
+        mpm.MohrCoulomb(**{**SOIL, "cohesion": 0.0}), residual_cohesion=0.0, residual_friction_angle=20.0, softening_strain=0.1,
+        reference_length=0.1,
+    )  # fmt: skip
+    with pytest.raises(mpm.InputError, match="cohesion of the law SofteningMohrCoulomb is 0 Pa, expected more than 0"):
+        layered_model(wrap(without)).set_parameter("cohesion", 1e3)
+
+
 def test_wrong_parameters_are_named():
     soil = mpm.MohrCoulomb(**SOIL)
     with pytest.raises(mpm.InputError, match="varying has 'colour', expected parameters .* young, poisson, cohesion"):

@@ -46,6 +46,27 @@ def test_points_and_particles_have_the_values_of_the_field(tmp_path, degree):
     assert np.ptp(np.log(strength[inside])) > 1
 
 
+def test_softening_soil_has_a_field_of_its_own_and_none_of_its_neighbour(tmp_path):
+    """Beside the clay that varies, the softening layer 1 keeps its cohesion, unless it has a field itself."""
+    layer = '[soils."layer 1"]\nmaterial = "softening"\nsoftening_strain = 0.1\nreference_length = 0.5\nresidual_cohesion = 1e3\n'
+    layer += "residual_friction_angle = 25.0\n"
+    for cohesion in ("5e3", "{value = 5e3, variation = 0.3, lengths = [8.0, 1.0]}"):
+        site = read_site(
+            site_in(tmp_path, f"shear_strength = {FIELD}", f"{layer}cohesion = {cohesion}"), MPI.COMM_WORLD
+        )
+        model = site.particles(3)
+        strength, tags = model.parameter("cohesion"), np.array(list(site.laws))[model.particles.material]
+        assert np.ptp(strength[np.isin(tags, site.tags_of(["clay"]))]) > 1e3
+        of_layer = strength[np.isin(tags, site.tags_of(["layer 1"]))]
+        fem = site.finite_elements(1)
+        rows = np.isin(
+            np.array(fem.soils)[np.repeat(fem.points.material, fem.points.per_cell)], site.tags_of(["layer 1"])
+        )
+        for values in (of_layer, fem.points.parameters["cohesion"][rows]):
+            assert (np.ptp(values) > 1e3) == ("variation" in cohesion)
+            assert np.ptp(values) > 0 or values == pytest.approx(5e3)
+
+
 def test_soil_that_does_not_vary_is_the_soil_without_a_field(tmp_path):
     factors = []
     for clay in (

@@ -77,6 +77,24 @@ def test_soils_have_it_from_the_beginning_and_laws_from_their_stage_on(tmp_path)
     assert sand == pytest.approx(0.2 * 3**0.7 * (19e3 + 20e3 * (3 - y)), rel=1e-2)
 
 
+def test_softening_soil_has_it_as_its_peak(tmp_path, recwarn):
+    """With the sensitivity of the table, 5, and no friction, peak or residual."""
+    law = LAW.replace(
+        'material = "viscoplastic"', 'material = "softening"\nsoftening_strain = 0.1\nreference_length = 0.5'
+    )
+    law = law.replace("viscosity = 1e3", "residual_cohesion = 200.0")
+    site = read_site(site_in(tmp_path, SITE + law + STAGES + UNDRAINED), COMM)
+    assert not [one for one in recwarn if "leaves out" in str(one.message) or "no effect" in str(one.message)]
+    soft = site.stages[-1].law["sand"]
+    assert (
+        soft.residual_friction_angle == soft.peak.friction_angle == 0
+        and soft.peak.cohesion / soft.residual_cohesion == 5
+    )
+    run = carry_out(site, 2, tmp_path, COMM)
+    y, sand = strength_of(run.site.fem, 2.0, 3.0)
+    assert sand == pytest.approx(0.2 * 3**0.7 * (19e3 + 20e3 * (3 - y)), rel=1e-2)
+
+
 def test_strengths_are_at_least_those_of_the_table_which_may_grow_with_depth(tmp_path):
     """Half of 30 kPa below the surface, and 10 kPa more with each metre."""
     text = SITE.replace(
