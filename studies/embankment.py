@@ -143,7 +143,7 @@ def main(arguments: list[str] | None = None) -> int:
     run = carry_out(site, degree, folder, comm, nmd=nmd, as_particles=nmd and begins_from_elements(site))
     failed, rows = run.stopped, run.rows
     built = perf_counter()
-    particles, failed_particles = build(site, a.particles_per_cell, a.factor, averaged, run.site)
+    particles, failed_particles = build(site, site_slides.particles_per_cell(a, site), a.factor, averaged, run.site)
     own_stages = not (failed or failed_particles or begins_from_elements(site))
     apart = stress_difference(particles, run.site) if own_stages else None
     model = particles.model

@@ -43,7 +43,7 @@ from .site_file import Site, site_of
 from .site_flow import boundary_of, wet_soils
 from .site_k0 import of_soils
 from .site_keys import CHANGES, DAY, changes_of, read_site_table
-from .site_mesh import part_of_mesh
+from .site_mesh import part_of_mesh, require_plane
 from .site_strength import refuse_strength_ratio
 from .slope_case import GRAVITY
 from .water_site import (
@@ -276,6 +276,7 @@ def read_consolidation_site(
         InputError: on all ranks, with the file, the key and what was expected.
     """
     table = read_site_table(path, needed=("boundaries", "points"))
+    require_plane(table, path)
     soils, rows = wet_soils(table, path, POROUS), table.get("stages", [])
     changes = changes_of(rows, [key for key in CHANGES if key not in ("excavate", "install", "remove")])
     if changes:

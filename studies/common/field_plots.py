@@ -77,7 +77,7 @@ def gathered(function: object, half_section: bool = False, parts: int = 1) -> Fi
     own = mesh["cells"][mesh["cell_owners"] == comm.rank]
     shapes, triangles = _divided(parts)
     nodes = np.einsum("qk,ckd->cqd", shapes, mesh["points"][own])
-    values = _within_cells(function, nodes)
+    values = within_cells(function, nodes)
     at_corner = shapes.argmax(axis=1)  # of each point, where sides are not divided
     names = mesh["global_nodes"][own[:, at_corner]] if parts == 1 else np.zeros(nodes.shape[:2], dtype=np.int64)
     at_triangles = nodes[:, triangles].reshape(-1, 2), values[:, triangles], names[:, triangles].reshape(-1, 1)
@@ -94,14 +94,14 @@ def gathered(function: object, half_section: bool = False, parts: int = 1) -> Fi
     return Field(corners[first], number.reshape(-1, 3), at_corners[first], half_section)
 
 
-def _within_cells(function: object, points: np.ndarray) -> np.ndarray:
-    """Values (m, q, k) of a function at points (m, q, 2) [m] of each of the m cells that this rank owns, as seen from within it."""
+def within_cells(function: object, points: np.ndarray) -> np.ndarray:
+    """Values (m, q, k) of a function at points (m, q, D) [m] of each of the m cells that this rank owns, as seen from within it."""
     m, q, _ = points.shape
     size = int(np.prod(function.ufl_shape, dtype=int))
     if not m:  # DOLFINx 0.5 cannot evaluate at none
         return np.zeros((0, q, size))
     x = np.zeros((m * q, 3))
-    x[:, :2] = points.reshape(-1, 2)
+    x[:, : points.shape[2]] = points.reshape(m * q, -1)
     return function.eval(x, np.repeat(np.arange(m, dtype=np.int32), q)).reshape(m, q, size)
 
 

@@ -11,8 +11,10 @@ from particle_player import Scene
 
 
 def scene_of(model: mpm.Model, soil_tags: Sequence[int]) -> Scene | None:
-    """The whole background mesh, with the cells of some tags as soil, on the first rank; None on the others. Collective."""
+    """The whole background mesh, with the cells of some tags as soil, on the first rank; None on the others, and of a body. Collective."""
     comm, mesh = model.comm, model.mesh
+    if mesh.dim == 3:
+        return None
     n = mesh.owned_cells
     parts = comm.gather((mesh.points[mesh.cells[:n]], mesh.cell_tags[:n]))
     if parts is None:

@@ -33,6 +33,8 @@ CAPTIONS = {
 
 def strength_pictures(site: Site, fem: bridge.QuasiStatic, folder: Path) -> Pictures:
     """Pictures of the strengths of a site that differ from point to point, one for each parameter and kind; none without any. Collective."""
+    if site.dimension == 3:
+        return {}
     comm, nodes = fem.domain.comm, compat.cell_nodes(fem.domain)[fem.points.cells]
     corners, pictures = fem.domain.geometry.x[nodes, :2], {}
     tags = np.array([*fem.soils, 0])[fem.points.material]  # 0, the last one, where no soil is

@@ -5,6 +5,7 @@ Example of a file:
     mesh = "embankment.geo"            # beside this file; or a .msh
     cell_size = 0.5                    # and other constants of the .geo file under [constants]
     axisymmetric = true                # the mesh is a half section about the axis x = 0; false by default
+                                       # dimension = 3 for a body of tetrahedra
 
     [soils.clay]                       # a physical group of the mesh
     unit_weight = 17e3                 # N/m3
@@ -19,7 +20,7 @@ Example of a file:
     unit_weight = 19e3
     python_law = "law.py:Sand"         # beside this file; or umat = "umat.so", properties, variables, strength_properties
 
-    [supports]                         # by default base fixed, and left, right and sides on rollers
+    [supports]                         # by default base fixed, and left, right, front, back and sides on rollers
     base = "fixed"
 
     [[stages]]                         # for the studies embankment, excavation and safety
@@ -95,6 +96,11 @@ class Site:
     k0: dict[str, float] = field(default_factory=dict)
     overconsolidation: dict[str, float] = field(default_factory=dict)
     strength_ratio: dict[str, bridge.StrengthRatio] = field(default_factory=dict)
+
+    @property
+    def dimension(self) -> int:
+        """2 for a section, 3 for a body of tetrahedra."""
+        return int(self.domain.topology.dim)
 
     @property
     def soils_with_strength_ratio(self) -> list[str]:

@@ -23,6 +23,7 @@ KEYS = {
     "cell_size": "a size of cells [m]",
     "constants": "values of other constants of the .geo file",
     "axisymmetric": "true for a half section about the axis x = 0",
+    "dimension": "3 for a body of tetrahedra, whose z axis points up; 2, by default, for a section",
     "air": "names of groups of the mesh that hold no soil",
     "soils": "tables [soils.NAME] for the physical groups of the mesh",
     "laws": "tables [laws.NAME] that stages name",

@@ -23,7 +23,27 @@ def geometry_of(table: dict[str, Any], path: Path) -> mpm.Geometry | None:
     axisymmetric = table.get("axisymmetric", False)
     if not isinstance(axisymmetric, bool):
         raise mpm.InputError(f"{path}: axisymmetric is {axisymmetric!r}, expected true or false")
+    if axisymmetric and dimension_of(table, path) == 3:
+        raise mpm.InputError(
+            f"{path} has axisymmetric = true and dimension = 3, expected one of them: a half section is plane"
+        )
     return mpm.Geometry.AXISYMMETRIC if axisymmetric else None
+
+
+def dimension_of(table: dict[str, Any], path: Path) -> int:
+    """Dimension of the mesh that the table of a site names; path: of the file, for messages."""
+    dimension = table.get("dimension", 2)
+    if dimension not in (2, 3) or isinstance(dimension, bool):
+        raise mpm.InputError(f"{path}: dimension is {dimension!r}, expected 2 or 3")
+    return int(dimension)
+
+
+def require_plane(table: dict[str, Any], path: Path) -> None:
+    """Raise InputError where the table of a site has a body in three dimensions, which a study of the flow of water does not take."""
+    if dimension_of(table, path) == 3:
+        raise mpm.InputError(
+            f"{path}: dimension is 3, expected 2: the studies safety, collapse, excavation, embankment and slope have bodies in three dimensions"
+        )
 
 
 def site_mesh(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None) -> tuple[Any, Any, Any]:
@@ -32,9 +52,12 @@ def site_mesh(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None) 
     constants = table.get("constants", {}) | ({} if size is None else {"cell_size": size})
     mesh = path.parent / str(table["mesh"])
     try:
-        return bridge.read_mesh(mesh, comm, parameters=constants)
+        return bridge.read_mesh(mesh, comm, dimension_of(table, path), parameters=constants)
     except mpm.InputError as error:
-        raise mpm.InputError(f"{path}: mesh: {error}") from None
+        text = str(error).replace(
+            "tetrahedra are read with dim=3", "of tetrahedra it needs dimension = 3 in the file of the site"
+        )
+        raise mpm.InputError(f"{path}: mesh: {text}") from None
 
 
 def part_of_mesh(mesh: tuple[Any, Any, Any], soils: Collection[str]) -> tuple[Any, Any, Any]:

@@ -26,6 +26,8 @@ from .site_field_plots import strength_pictures
 from .site_file import Site, read_site
 from .site_k0 import say_left_out
 from .site_mesh import cell_size_of
+from .solid_plots import save_solid_mechanism
+from .solids import solid_mechanism
 from .slope_fem import finite_elements, step_line
 from .summary import write_summary
 from .water_table import level_line
@@ -117,20 +119,24 @@ def _drawn(
     folder: Path, sizes: list, runs: list[bridge.Collapse], label: str, site: Site, model: bridge.QuasiStatic
 ) -> Pictures:
     """Mechanism on the finest mesh, the value over displacement, and convergence. Collective."""
-    field = mechanism_field(runs[-1].mechanism, site.axisymmetric, model.cell_tags, model.off)
-    wet = model.largest_pore_pressure() > 0
-    if field is None:
+    solid = site.dimension == 3
+    body = solid_mechanism(model, runs[-1].mechanism) if solid else None
+    field = None if solid else mechanism_field(runs[-1].mechanism, site.axisymmetric, model.cell_tags, model.off)
+    wet = not solid and model.largest_pore_pressure() > 0
+    if field is None and body is None:
         return {}
     pressures = [stage.pore_pressure for stage in site.stages if stage.pore_pressure is not None]
-    table = level_line(pressures[-1], field.points.min(axis=0), field.points.max(axis=0)) if wet and pressures else None
+    corners = None if field is None else (field.points.min(axis=0), field.points.max(axis=0))
+    table = level_line(pressures[-1], *corners) if wet and pressures and corners else None
     names = ["mesh of the site" if size is None else f"cells of {size:g} m" for size in sizes]
     curves = {name: (1e3 * run.curve[:, 1], run.curve[:, 0]) for name, run in zip(names, runs)}
     wide, lowest = 1e3 * bend([run.curve for run in runs]), 0.98 * min(run.curve[0, 0] for run in runs)
     values, least = {"site": [run.value for run in runs]}, "" if runs[-1].failed else "of at least "
     lines = [np.array(member.points) for member in model.members.values()]
     title = f"{label.split(' [')[0]} {least}{runs[-1].value:.3f}"
+    path = folder / "mechanism.png"
     pictures: Pictures = {
-        "mechanism": lambda: save_mechanism(folder / "mechanism.png", field, title, water=table, members=lines),
+        "mechanism": lambda: save_solid_mechanism(path, body, title) if solid else save_mechanism(path, field, title, water=table, members=lines),
         "value_displacement": lambda: save_curves(
             folder / "value_displacement.png", curves, ("Largest displacement [mm]", label), limits=((0, wide), (lowest, None))),
     }  # fmt: skip

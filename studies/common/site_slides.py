@@ -38,10 +38,13 @@ from .schemes import add_particles_per_cell, add_pic
 from .site_field_plots import strength_pictures
 from .site_file import Site, read_site
 from .site_k0 import begin_at_rest
+from .solid_particles import save_solid_particles, solid_frame
 from .summary import write_summary
 
 comm = MPI.COMM_WORLD
-COLUMNS = ["time_s", "largest_displacement_m", "kinetic_energy_J_per_m", "plastic_fraction"]
+COLUMNS = ["time_s", "largest_displacement_m", "plastic_fraction"]
+IN_TETRAHEDRON = 4
+"""Particles in a tetrahedron unless an option says how many"""
 CAPTIONS = {
     "slide_displacement": "Displacement at the end of the slide",
     "slide_strain": "Accumulated plastic shear strain at the end of the slide",
@@ -88,13 +91,25 @@ class Slide:
         moved = np.linalg.norm(self.model.particles.displacement, axis=1).max(initial=0.0)
         forces = {name: self.model.member_forces(name) for name in self.model.members}
         self.history.add(
-            time_s=report.time, largest_displacement_m=comm.allreduce(float(moved), MPI.MAX),
-            kinetic_energy_J_per_m=report.kinetic_energy, plastic_fraction=report.plastic_fraction, **force_row(self.model.members, forces),
+            time_s=report.time, largest_displacement_m=comm.allreduce(float(moved), MPI.MAX), plastic_fraction=report.plastic_fraction,
+            **{energy_column(self.model): report.kinetic_energy}, **force_row(self.model.members, forces),
         )  # fmt: skip
         self.files.write()
-        frame = particle_frame(self.model, report.time)
+        solid = self.model.mesh.dim == 3
+        frame = (solid_frame if solid else particle_frame)(self.model, report.time)
         if frame is not None:
-            self.frames.append(frame)
+            self.frames = [*([] if solid else self.frames), frame]  # of a body the last one is drawn
+
+
+def energy_column(model: mpm.Model) -> str:
+    """Column of the kinetic energy, which in plane strain is that of a slice 1 m thick."""
+    return "kinetic_energy_J" if model.mesh.dim == 3 else "kinetic_energy_J_per_m"
+
+
+def particles_per_cell(a: Namespace, site: Site) -> int:
+    """Particles in each cell of a site: as an option says, else its default in triangles and `IN_TETRAHEDRON` in tetrahedra."""
+    given = site.dimension == 2 or "--particles-per-cell" in a.given
+    return int(a.particles_per_cell) if given else IN_TETRAHEDRON
 
 
 def averages(a: Namespace, laws: Iterable[Any]) -> bool:
@@ -117,7 +132,9 @@ def slide(
     options = {"every": a.time / a.frames, "damping": a.damping, "pic": a.pic, "nmd": nmd}
     scheme = model.explicit if step is None else partial(model.implicit, dt=step)
     with (
-        History(folder / "history.csv", [*COLUMNS, *force_columns(model.members)], comm) as history,
+        History(
+            folder / "history.csv", [*COLUMNS, energy_column(model), *force_columns(model.members)], comm
+        ) as history,
         ModelOutput(model, folder / "particles", folder / "mesh") as files,
         Progress("slide", a.time, comm) as progress,
     ):
@@ -141,13 +158,17 @@ def slide_pictures(a: Namespace, result: Slide, scene: Scene | None, folder: Pat
     Args:
         a: options with pictures and film.
     """
-    if scene is None or not a.pictures:
+    solid = result.model.mesh.dim == 3
+    if not (result.frames if solid else scene) or not a.pictures:
         return {}
     last, history = result.frames[-1], result.history
     largest = history["largest_displacement_m"]
 
     def particles(name: str, key: str, quantity: Quantity) -> None:
-        save_particles(folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
+        if solid:
+            save_solid_particles(folder / f"{name}.png", last, key, quantity)
+        else:
+            save_particles(folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
                        title=f"$t$ = {last['time']:.1f} s", bodies=last.get("bodies"))  # fmt: skip
 
     pictures: dict[str, Callable] = {
@@ -161,7 +182,7 @@ def slide_pictures(a: Namespace, result: Slide, scene: Scene | None, folder: Pat
         pictures["member_forces"] = lambda: save_history(
             folder / "member_forces.png", history["time_s"], axial, "Axial force [kN/m]"
         )
-    if a.film:
+    if a.film and not solid:
         pictures["film"] = lambda: save_animation(folder / "slide", scene, result.frames, "shear_strain", SHEAR_STRAIN)
     return pictures
 
@@ -198,7 +219,7 @@ def site_slide(a: Namespace) -> int:
     with without_warning(NOT_REACHED):  # said by the error
         _carry_weight(site, fem, a.site)
     random = strength_pictures(site, fem, folder) if a.pictures else {}
-    model = site.particles(a.particles_per_cell, more=site.weaker_laws(a.factor))
+    model = site.particles(particles_per_cell(a, site), more=site.weaker_laws(a.factor))
     handover = bridge.initialise(model, fem, count_displacement=False, nmd=nmd, equilibrate=not fem.members)
     model.assign(model.particles.material + len(site.laws))
     with Interrupt(comm) as interrupt:

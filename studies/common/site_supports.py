@@ -8,7 +8,10 @@ from typing import Any
 import fenics_bridge as bridge
 import mpm_core as mpm
 
-DEFAULT_SUPPORTS = {"base": "fixed", **dict.fromkeys(("left", "right", "sides", "axis", "far"), "roller")}
+DEFAULT_SUPPORTS = {
+    "base": "fixed",
+    **dict.fromkeys(("left", "right", "front", "back", "sides", "axis", "far"), "roller"),
+}
 """Supports of boundaries by their names, where a file has none"""
 
 

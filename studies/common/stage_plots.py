@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -133,22 +133,31 @@ def stage_pictures(
     """
     if not pictures:
         return {}
-    first = max((k for k, stage in enumerate(stages[: len(rows)]) if stage.reset_displacement), default=0)
+    first = first_shown(stages, rows)
     before = pictures[first - 1].strain if first else 0.0
     rows, pictures = rows[first:], [replace(picture, strain=picture.strain - before) for picture in pictures[first:]]
-    curves = {name: [1e3 * row[key] for row in rows] for key, name in
-              (("heave_m", "largest heave"), ("settlement_m", "largest settlement"),
-               ("sideways_m", "largest horizontal"))}  # fmt: skip
-    names, flows = [row["stage"] for row in rows], [
-        one.flow for one in pictures if one.flow is not None and one.flow.moves
-    ]
+    flows = [one.flow for one in pictures if one.flow is not None and one.flow.moves]
     flowing: Pictures = {"stages_flow": lambda: save_flow(folder / "stages_flow.png", few(flows))} if flows else {}
     return {
         **flowing,
         "stages_displacement": lambda: save_stages(folder / "stages_displacement.png", pictures, MOVED),
         "stages_strain": lambda: save_stages(folder / "stages_strain.png", pictures, SHEAR),
-        "movements": lambda: save_over_stages(folder / "movements.png", names, curves, "Displacement [mm]"),
+        "movements": movement_picture(rows, folder),
     }
+
+
+def first_shown(stages: Sequence[bridge.Stage], rows: Sequence[Any]) -> int:
+    """The first stage from which displacements count: the last one that resets them, of those that have rows of results."""
+    return max((k for k, stage in enumerate(stages[: len(rows)]) if stage.reset_displacement), default=0)
+
+
+def movement_picture(rows: Sequence[Mapping[str, Any]], folder: Path) -> Callable[[], None]:
+    """A picture of the largest movements over the stages."""
+    curves = {name: [1e3 * row[key] for row in rows] for key, name in
+              (("heave_m", "largest heave"), ("settlement_m", "largest settlement"),
+               ("sideways_m", "largest horizontal"))}  # fmt: skip
+    names = [row["stage"] for row in rows]
+    return lambda: save_over_stages(folder / "movements.png", names, curves, "Displacement [mm]")
 
 
 class StageFiles:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,8 @@ from .quiet import NOT_REACHED, without_warning
 from .site_file import Site
 from .site_options import add_site_file
 from .stage_flow import flow_row, warn_of_heave
-from .stage_plots import StageFiles, StagePicture, stage_picture, stage_pictures
+from .solid_stages import solid_stage, solid_stage_pictures
+from .stage_plots import StageFiles, stage_picture, stage_pictures
 
 
 def add_stage_options(parser: ArgumentParser, site: str, elements: str) -> None:
@@ -40,13 +41,16 @@ class StageRun:
 
     site: bridge.FemSite
     rows: list[dict[str, Any]] = field(default_factory=list)
-    pictures: list[StagePicture] = field(default_factory=list)
+    pictures: list[Any] = field(default_factory=list)
     forces: list[StageForces] = field(default_factory=list)
     stopped: str | None = None
 
     def drawn(self, stages: Sequence[bridge.Stage], folder: Path) -> Pictures:
         """Pictures of the stages and of the structural members."""
-        return {**stage_pictures(stages, self.rows, self.pictures, folder), **member_pictures(self.forces, folder)}
+        draw: Callable[..., Pictures] = (
+            stage_pictures if self.site.fem.domain.topology.dim == 2 else solid_stage_pictures
+        )
+        return {**draw(stages, self.rows, self.pictures, folder), **member_pictures(self.forces, folder)}
 
 
 @without_warning(NOT_REACHED)  # said by the error
@@ -73,7 +77,7 @@ def carry_out(site: Site, degree: int, folder: Path, comm: MPI.Comm, **options: 
             run.rows.append({**movements(run.site), "stage": report.name, "steps": report.steps, "iterations": report.iterations,
                              "largest_displacement_m": report.largest_displacement, **flow_row(run.site.state.pore_pressure), **force_row(run.site.fem.members, run.forces[-1].forces)})  # fmt: skip
             warn_of_heave(run.rows[-1], [run.site.state.unit_weight[tag] for tag in run.site.state.there])
-            picture = stage_picture(run.site, report.name)
+            picture = (stage_picture if site.dimension == 2 else solid_stage)(run.site, report.name)
             if picture is not None:
                 run.pictures.append(picture)
                 print(f"stage {report.number}, {report.name}: {report.steps} steps, largest displacement "
@@ -87,7 +91,6 @@ def movements(staged: bridge.FemSite) -> dict[str, float]:
     fem = staged.fem
     there = np.repeat(fem.points.material >= 0, fem.points.per_cell)
     u = fem.evaluate_at(fem.points.coordinates())["displacement"][there]
-    largest = [
-        fem.domain.comm.allreduce(float(v.max(initial=0.0)), MPI.MAX) for v in (u[:, 1], -u[:, 1], np.abs(u[:, 0]))
-    ]
+    movements = u[:, -1], -u[:, -1], np.linalg.norm(u[:, :-1], axis=1)
+    largest = [fem.domain.comm.allreduce(float(v.max(initial=0.0)), MPI.MAX) for v in movements]
     return dict(zip(("heave_m", "settlement_m", "sideways_m"), largest))

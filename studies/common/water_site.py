@@ -34,7 +34,7 @@ from .site_doubts import warn_of_flooded_ground, warn_of_reservoirs
 from .site_file import Site
 from .site_flow import boundary_of, wet_soils
 from .site_keys import DAY, UNDRAINED, changes_of, member_of, read_site_table
-from .site_mesh import check_soils, geometry_of, part_of_mesh, site_mesh
+from .site_mesh import check_soils, geometry_of, part_of_mesh, require_plane, site_mesh
 
 
 @dataclass
@@ -116,6 +116,7 @@ def read_water_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) 
         InputError: on all ranks, with the file, the key and what was expected.
     """
     table = read_site_table(path, needed=("boundaries",))
+    require_plane(table, path)
     geometry, soils = geometry_of(table, path), wet_soils(table, path)
     dry = [name for name, soil in soils.items() if soil is None]
     if len(dry) == len(soils):
@@ -140,6 +141,7 @@ def read_water_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) 
 def read_water_table(path: Path, needed: Sequence[str]) -> dict[str, Any]:
     """The file of a site, for a study that computes its water in plane sections; needed: keys besides mesh and soils."""
     table = read_site_table(path, needed)
+    require_plane(table, path)
     if table.get("axisymmetric", False) is not False:
         raise mpm.InputError(
             f"{path}: axisymmetric is {table['axisymmetric']!r}, expected false: this study has plane sections"
