@@ -80,7 +80,15 @@ def require_along(comm: MPI.Comm, corners: NDArray[np.float64], lines: Mapping[s
     """
     here = next((f"{name} {text}" for name, line in lines.items() if (text := _beside(corners, line))), None)
     found = next(filter(None, comm.allgather(here)), None)
-    agree(comm, found and f"{found}, expected a line of the mesh; in gmsh, fragment the ground with it")
+    agree(
+        comm,
+        found and f"{found}, expected a line of the mesh; in gmsh, fragment the ground with it and with its points",
+    )
+
+
+def is_along(corners: NDArray[np.float64], line: NDArray[np.float64]) -> bool:
+    """Whether a line (k, 2) [m] goes through none of some cells with the corners (m, 3, 2) [m], and its corners are nodes of theirs."""
+    return not _beside(corners, line)
 
 
 def warn_of_absent(comm: MPI.Comm, corners: NDArray[np.float64], lines: Mapping[str, NDArray[np.float64]]) -> None:

@@ -16,6 +16,7 @@ from scipy import sparse
 from fenics_bridge import compat
 from fenics_bridge.structures.bond import bond_strengths, slip_tangent
 from fenics_bridge.structures.embedding import Embedding, cell_sizes_along
+from fenics_bridge.structures.line_nodes import shared_nodes
 from fenics_bridge.structures.unknowns import Unknowns
 from mpm_core import _core
 
@@ -255,7 +256,10 @@ class Members:
 
     def _installed(self, member: Member, size: float) -> _Installed:
         """A member without any strain; size: of the cells around it [m]."""
-        nodes = member.nodes(size / min(2, compat.degree_of(self._space)) or member.length)
+        degree = compat.degree_of(self._space)
+        bends_freely = member.bending_stiffness > 0 and member.spacing is None
+        shared = shared_nodes(self._space.mesh, np.array(member.points), degree) if bends_freely else None
+        nodes = member.nodes(size / min(2, degree) or member.length) if shared is None else shared
         strains = member.strains(nodes, self._of_revolution)
         one = _Installed(member, nodes, strains, np.zeros(0), None, member.prestress != 0)
         one.force = one.unstrained()

@@ -209,7 +209,8 @@ def beam(
         bending_stiffness: E I [N m2/m].
         plastic_moment: largest bending moment [N m/m], at which a plastic hinge forms; by default it stays elastic.
         bond_strength: largest force between both sides of the beam and the soil per length of the beam [N/m2].
-        spacing: length of the segments into which it is divided [m]; by default about the distance of the nodes around it.
+        spacing: length of the segments into which it is divided [m]; by default about the distance of the nodes around it, and in
+            finite elements whose edges it follows their nodes along it.
         clamped_start: whether it cannot turn at its first point: where a raft or a lining is cut by an axis of symmetry. Clamped ends
             are for finite elements.
         clamped_end: whether it cannot turn at its last point.

@@ -1,0 +1,75 @@
+"""Nodes of a mesh along a line that its edges follow, which a beam along this line shares with the soil."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenics_bridge import compat
+from fenics_bridge.mesh.walls import EDGES, ON_LINE, edges_on, is_along
+
+
+def shared_nodes(domain: Any, line: NDArray[np.float64], degree: int) -> NDArray[np.float64] | None:
+    """Nodes of finite elements on a line of the mesh, in the line's order; None where the mesh does not follow it. Collective.
+
+    A beam that has other nodes than the soil beside it moves with some of these only: its nodes and those of the soil press against
+    one another in turns, its shear force jumps from segment to segment, and soil flows between nodes that are far apart.
+
+    Args:
+        domain: mesh of triangles; others are never followed.
+        line: its corners [m], (k, 2).
+        degree: of the elements; from 2 on the middles of edges are nodes too.
+
+    Returns:
+        Positions [m], (n, 2), among them the corners of the line as they are given.
+    """
+    comm = domain.comm
+    if domain.geometry.dim != 2 or line.shape[1] != 2:
+        return None
+    corners = domain.geometry.x[compat.cell_nodes(domain), :2]
+    if not all(comm.allgather(is_along(corners, line))):
+        return None
+    rows, edges = np.nonzero(edges_on(corners, [line]))
+    ends = corners[rows[:, None], np.array(EDGES)[edges]]  # (m, 2, 2)
+    ends = np.concatenate(comm.allgather(ends))
+    parts = [line[:1]]
+    for start, end in zip(line, line[1:]):
+        places = _places(ends, start, end)
+        if places is None:
+            return None
+        if degree > 1:
+            places = np.sort(np.concatenate([places, (places[1:] + places[:-1]) / 2]))
+        parts.append(start + places[1:, None] * (end - start))
+    return np.concatenate(parts)
+
+
+def _places(
+    ends: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Where the ends (m, 2, 2) of edges divide the straight line between two points, from 0 to 1; None where edges do not cover it."""
+    along = end - start
+    square = float(along @ along)
+    part = (ends - start) @ along / square
+    off = np.linalg.norm(ends - start - part[:, :, None] * along, axis=2)
+    size = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    near = ON_LINE * size / np.sqrt(square)
+    on = (
+        (off <= ON_LINE * size[:, None]).all(axis=1)
+        & (part >= -near[:, None]).all(axis=1)
+        & (part <= 1 + near[:, None]).all(axis=1)
+    )
+    if not on.any():
+        return None
+    part, near = part[on], float(near[on].min())
+    places = np.sort(part.ravel())
+    places = places[np.concatenate([[True], np.diff(places) > near])]
+    lengths = np.unique(
+        np.round(np.sort(part, axis=1) / near), axis=0
+    )  # edges, each once, whichever cells and ranks have it
+    covered = abs(places[0]) <= near and abs(places[-1] - 1) <= near and len(lengths) >= len(places) - 1
+    if not covered:
+        return None
+    places[[0, -1]] = 0.0, 1.0
+    return places

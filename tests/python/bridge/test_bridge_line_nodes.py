@@ -1,0 +1,74 @@
+"""Nodes of beams along lines of the mesh: those of the soil, so that shear forces are those of equilibrium."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge.structures.line_nodes import shared_nodes
+
+LEFT, RIGHT, BOTTOM, TOP = 1, 2, 3, 4
+LENGTH = 4.0
+CELLS = 12
+
+
+def stretched():
+    """A block 4 m long and 0.5 m high whose cells become longer from left to right."""
+    domain, cell_tags, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (LENGTH, 0.5), (CELLS, 2))
+    domain.geometry.x[:, 0] = LENGTH * (domain.geometry.x[:, 0] / LENGTH) ** 1.5
+    return domain, cell_tags, facet_tags
+
+
+EDGES = LENGTH * np.linspace(0, 1, CELLS + 1) ** 1.5
+"""Where its cells end [m]"""
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_the_shear_force_of_a_beam_on_the_mesh_is_that_of_equilibrium(degree):
+    """A beam on two supports under p has V = p (L / 2 - x): between two nodes there is what lies on one side of their middle.
+
+    Of a quadratic edge of the length h the middle carries 2/3 p h and each end p h / 6, so that V is off by p h / 12 at most.
+    """
+    pressure = 1e3
+    domain, cell_tags, facet_tags = stretched()
+    supports = [bridge.roller(LEFT, (0, 1)), bridge.prescribed(RIGHT, (0.0, 0.0))]
+    soil = mpm.LinearElastic(young=1e-3, poisson=0.0)
+    fem = bridge.QuasiStatic(domain, soil, facet_tags, supports, degree=degree, cell_tags=cell_tags)
+    fem.reconfigure(members={"beam": mpm.beam([(0.0, 0.5), (LENGTH, 0.5)], 1e8, 1e6)})
+    fem.solve(bridge.Load(pressure={TOP: pressure}))
+    forces = fem.member_forces("beam")
+    expected = pressure * (LENGTH / 2 - (forces.positions[1:, 0] + forces.positions[:-1, 0]) / 2)
+    off = pressure * np.diff(EDGES).max() / 12
+    assert len(forces.positions) == degree * CELLS + 1
+    assert np.allclose(np.abs(forces.shear_force), np.abs(expected), rtol=0, atol=1.01 * off)
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_shared_nodes_are_those_of_the_mesh_with_the_corners_of_the_line(backwards):
+    domain = stretched()[0]
+    line = np.array([(0.0, 0.0), (0.0, 0.5), (EDGES[7], 0.5)])  # around a corner of the block
+    expected = np.array([(0.0, 0.0), (0.0, 0.25), (0.0, 0.5), *((x, 0.5) for x in EDGES[1:8])])
+    order = slice(None, None, -1 if backwards else 1)
+    assert np.allclose(shared_nodes(domain, line[order], 1), expected[order], atol=1e-12)
+    quadratic = shared_nodes(domain, line[order], 2)
+    assert np.allclose(quadratic[::2], expected[order], atol=1e-12)
+    assert np.allclose(quadratic[1::2], (expected[1:] + expected[:-1])[order] / 2, atol=1e-12)
+
+
+@pytest.mark.parametrize("line", [
+    [(0.1, 0.0), (0.1, 0.5)],  # through cells
+    [(0.0, 0.25), (1.0, 0.25)],  # ends between two nodes
+    [(0.0, 0.5), (LENGTH + 1, 0.5)],  # beyond the mesh
+    [(0.0, 0.7), (LENGTH, 0.7)],  # outside of it
+])  # fmt: skip
+def test_lines_that_the_mesh_does_not_follow_share_no_nodes(line):
+    assert shared_nodes(stretched()[0], np.array(line), 2) is None
+
+
+def test_a_spacing_of_the_beam_is_kept():
+    domain, cell_tags, facet_tags = stretched()
+    soil = mpm.LinearElastic(young=1e6, poisson=0.0)
+    fem = bridge.QuasiStatic(domain, soil, facet_tags, [bridge.fixed(BOTTOM)], degree=2, cell_tags=cell_tags)
+    fem.reconfigure(members={"beam": mpm.beam([(0.0, 0.5), (LENGTH, 0.5)], 1e8, 1e6, spacing=0.5)})
+    assert np.allclose(fem.member_forces("beam").positions[:, 0], np.linspace(0, LENGTH, 9))
