@@ -20,6 +20,18 @@ concrete 3e10, and piles far apart 1e9"""
 SOFTEST_BAR = 5e4
 """Axial stiffness [N/m] below which that of a bar or strut is more probably in kN: weak geogrids have 2e5"""
 
+SOFTEST_STRUT = 1e6
+"""The same of a strut or tie, which is of steel, concrete or wood: a tie rod of 20 mm every 3 m has 2e7"""
+
+STIFFEST_BEAM = 2.5e11
+"""Young's modulus [Pa] of a plate as stiff as a beam, above which its bending stiffness is more probably in kN m2/m: steel has 2.1e11"""
+
+LEAST_PRESTRESS = 1e3
+"""Prestress [N/m] below which it is more probably in kN/m, where it is below `LEAST_STRAIN` too: those of struts and anchors have tens of kN/m"""
+
+LEAST_BOND = 500.0
+"""Bond strength [N/m2] below which it is more probably in kN/m2: that of a weak nail every 2 m has 3e3"""
+
 LEAST_STRAIN = 1e-5
 """Strain at which a member yields, below which its strength is more probably in kN: steel yields at some 1e-3, and concrete cracks at
 1e-4"""
@@ -48,9 +60,24 @@ def odd_units(name: str, member: Member) -> list[str]:
             f"the beam {name!r} is as stiff as a plate {thickness:.3g} m thick with a Young's modulus of {stiffness / thickness:.3g} Pa, "
             "less than that of any wall: axial_stiffness is in N/m and bending_stiffness in N m2/m, not in kN"
         )
-    if not bending and stiffness < SOFTEST_BAR:
+    if bending and stiffness / thickness > STIFFEST_BEAM:
         found.append(
-            f"axial_stiffness of the member {name!r} is {stiffness:g} N/m, less than that of any geogrid; it is in N/m, not in kN/m"
+            f"the beam {name!r} is as stiff as a plate {thickness:.3g} m thick with a Young's modulus of {stiffness / thickness:.3g} Pa, "
+            "more than that of steel: bending_stiffness is in N m2/m as axial_stiffness is in N/m, not in kN m2/m"
+        )
+    softest, of_any = (SOFTEST_BAR, "geogrid") if member.bonded else (SOFTEST_STRUT, "strut or tie")
+    if not bending and stiffness < softest:
+        found.append(
+            f"axial_stiffness of the member {name!r} is {stiffness:g} N/m, less than that of any {of_any}; it is in N/m, not in kN/m"
+        )
+    if 0 < abs(member.prestress) < min(LEAST_PRESTRESS, LEAST_STRAIN * stiffness):
+        found.append(
+            f"prestress of the member {name!r} is {member.prestress:g} N/m, which hardly stresses it; it is in N/m, not in kN/m"
+        )
+    if 0 < member.bond_strength < LEAST_BOND:
+        found.append(
+            f"bond_strength of the member {name!r} is {member.bond_strength:g} N/m2, less than that of any nail or geogrid; it is in N/m2, "
+            "not in kN/m2"
         )
     strains = {
         "tensile_strength": member.tensile_strength / stiffness,

@@ -366,10 +366,17 @@ def test_an_axisymmetric_model_takes_no_members():
         (mpm.bar([(0.1, 0.9), (0.8, 0.9)], 30e3), "axial_stiffness of the member 'it' is 30000 N/m, less than"),
         (mpm.bar([(0.1, 0.9), (0.8, 0.9)], 30e6, 60.0), "tensile_strength of the member 'it' is 60 N/m, .* strain of 2e-06"),
         (mpm.strut((0.1, 0.9), (0.8, 0.9), 0.7e9, compressive_strength=800.0), "compressive_strength of the member 'it' is 800 N/m"),
+        (mpm.beam([(0.1, 0.9), (0.1, 0.1)], 24e9, 1.28e6), "a plate 0.0253 m thick .* of 9.49e.11 Pa, more than that of steel"),
+        (mpm.strut((0.1, 0.9), (0.8, 0.9), 0.7e6), "axial_stiffness of the member 'it' is 700000 N/m, less than that of any strut or tie"),
+        (mpm.strut((0.1, 0.9), (0.8, 0.9), 0.7e9, prestress=-60.0), "prestress of the member 'it' is -60 N/m, which hardly"),
+        (mpm.bar([(0.1, 0.9), (0.8, 0.9)], 30e6, bond_strength=25.0), "bond_strength of the member 'it' is 25 N/m2, less than"),
     ],
 )  # fmt: skip
 def test_members_in_kn_are_a_warning_in_particles_and_in_finite_elements(member, message):
-    """An AZ 18-700, a diaphragm wall of 0.8 m, a nail and a strut, with stiffness or strength in kN."""
+    """An AZ 18-700, a diaphragm wall of 0.8 m, a nail and a strut, with stiffness, strength, prestress or bond in kN.
+
+    The wall with EA = 24 GN/m and EI = 1.28 MN m2/m is a plate with t^2 = 12 EI / EA = (0.0253 m)^2 and E = EA / t = 949 GPa.
+    """
     mesh = bridge.box_mesh(COMM, (1.0, 1.0), (4, 4))
     model = mpm.Model(bridge.background_mesh(*mesh), mpm.LinearElastic(young=10e6, poisson=0.2))
     with pytest.warns(RuntimeWarning, match=message):
@@ -384,7 +391,11 @@ def test_usual_members_are_no_warning(recwarn):
     plates = {f"{young:g} {thick}": mpm.beam([(3.0, 3.0), (3.0, 0.8)], young * thick, young * thick**3 / 12, 1e-3 * young * thick**2 / 4)
               for young, thick in ((30e9, 0.8), (5e9, 0.6), (2e9, 0.4))}  # fmt: skip
     grids = {f"grid {k}": mpm.bar([(1.0, 1.0), (5.0, 1.0)], k, 0.1 * k, 0.0) for k in (2e5, 2e6)}
-    fem.reconfigure(members={**plates, **grids, "nail": mpm.bar([(1.0, 1.0), (5.0, 1.0)], 30e6, 20e3)})
+    nail = mpm.bar([(1.0, 1.0), (5.0, 1.0)], 30e6, 20e3, bond_strength=3e3)
+    tie = mpm.strut((3.0, 1.0), (5.0, 1.0), 2e7, prestress=2e3)
+    slab = mpm.strut((3.0, 1.0), (5.0, 1.0), 9e9, prestress=-10e3)  # of concrete, 0.3 m thick
+    liner = mpm.beam([(3.0, 3.0), (3.0, 0.8)], 210e9 * 0.014, 210e9 * 0.014**3 / 12)  # of steel, 14 mm thick
+    fem.reconfigure(members={**plates, **grids, "nail": nail, "tie": tie, "slab": slab, "liner": liner})
     assert not [w for w in recwarn if "not in k" in str(w.message)]
 
 
