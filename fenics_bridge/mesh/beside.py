@@ -43,10 +43,9 @@ def tags_beside(domain: mesh.Mesh, cell_tags: MeshTags, wall: Any) -> tuple[Mesh
     dim, comm = domain.topology.dim, domain.comm
     require_tags_of(domain, cell_tags, dim)
     agree(comm, None if dim == 2 else f"domain has {dim} dimensions, expected triangles")
-    lines = lines_of(comm, [wall])
-    line = next(iter(lines.values()))
+    line = next(iter(lines_of(comm, [wall]).values()))
     corners = domain.geometry.x[compat.cell_nodes(domain), :dim]
-    require_along(comm, corners, lines)
+    require_along(comm, corners, {"wall": line})
     tags = tag_values(domain, cell_tags, dim)
     rows = np.flatnonzero(_beside(corners, line) & (tags > 0))
     old = sorted(set().union(*comm.allgather(set(tags[rows].tolist()))))

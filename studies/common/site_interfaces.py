@@ -74,10 +74,16 @@ def split_beside(
 
     Returns:
         The new cell tags, and what is beside walls.
+
+    Raises:
+        InputError: the mesh does not follow one of these walls. Raised on all ranks alike.
     """
     beside = Interfaces(fractions)
     for wall in fractions:
-        cell_tags, before = bridge.tags_beside(domain, cell_tags, members[wall])
+        try:
+            cell_tags, before = bridge.tags_beside(domain, cell_tags, members[wall])
+        except mpm.InputError as error:  # on all ranks
+            raise mpm.InputError(f"members.{wall}: {INTERFACE}: {error}") from None
         for new, old in before.items():
             if old in laws:
                 laws[new] = laws[old]

@@ -151,3 +151,11 @@ def test_the_moment_of_a_wall_grows_with_a_weaker_interface(tmp_path):
             pass
         moments.append(abs(fem.fem.member_forces("wall").moment).max())
     assert moments[1] > 1.05 * moments[0]
+
+
+def test_a_wall_with_an_interface_that_the_mesh_does_not_follow_is_an_error_that_names_it(tmp_path):
+    """Its line is on the mesh from 20 to 9 m; the level of a strut between two nodes is not one of them."""
+    text = "[members.wall]\ninterface_strength = 0.7\npoints = [[5.0, 20.0], [5.0, 17.77], [5.0, 9.0]]\n"
+    place = r"members.wall: interface_strength: wall has the point \(5, 17.77\) m between the nodes of the mesh"
+    with pytest.raises(mpm.InputError, match=place):
+        site_in(tmp_path, text)
