@@ -4,7 +4,8 @@ A strip or circular footing, smooth or rough, is a rigid body in contact with th
 and is pushed further when the soil beside it has risen above its base. The clay is undrained and has no weight (Tresca), so
 that the load over area and shear strength just after the soil has yielded is the bearing capacity factor N_c: 5.14 for a
 strip, 5.69 for a smooth and 6.05 for a rough circle. It converges from above, because cells at the edge make the footing
-wider by half of their size. With further penetration the load continues to rise, as for an embedded footing.
+wider by half of their size. With further penetration the load continues to rise, as for an embedded footing. Soft clay, as that
+of the default --rigidity, has not yielded before the footing is embedded: take 2000 or more to find N_c.
 """
 
 from __future__ import annotations
@@ -43,7 +44,9 @@ EXACT = {
 """Bearing capacity factors: Prandtl 1920; Cox, Eason and Hopkins 1961; Eason and Shield 1960"""
 COLLAPSE = (12.0, 24.0)
 """Settlements between which the factor is taken, over the width times the strength over Young's modulus: the soil has just
-yielded, and the footing is hardly embedded"""
+yielded, and stiff clay has hardly embedded the footing"""
+EMBEDDED = 0.03
+"""Settlement over the width, above which the load is more than that of a footing at the surface"""
 
 
 # --- 1. Options ------------------------------------------------------------------------------------------------------
@@ -155,11 +158,28 @@ def collapse_factor(a: Namespace, history: History) -> float | None:
     return float(history["load_factor"][chosen].mean()) if chosen.any() else None
 
 
+def read_between(a: Namespace) -> tuple[float, float]:
+    """Settlements between which the bearing capacity factor is read [m]."""
+    first, last = (2 * a.half_width * ratio / a.rigidity for ratio in COLLAPSE)
+    return first, last
+
+
+def embedded(a: Namespace) -> str:
+    """What the line of results adds where the factor is that of an embedded footing rather than that of the surface; else no text."""
+    last = COLLAPSE[1] / a.rigidity
+    if last <= EMBEDDED:
+        return ""
+    return (
+        f" ({a.rigidity:g} times as stiff as strong, the clay yields as the footing is embedded by up to {100 * last:.2g} % of its width, which "
+        f"raises N_c; with --rigidity {COLLAPSE[1] / EMBEDDED:.0f} and more it is that of the surface)"
+    )
+
+
 def factor_said(a: Namespace, factor: float | None, settlement: float) -> str:
     """The bearing capacity factor in words, or why there is none."""
+    first, last = read_between(a)
     if factor is not None:
-        return f"{factor:.2f}"
-    first, last = (2 * a.half_width * ratio / a.rigidity for ratio in COLLAPSE)
+        return f"{factor:.2f} at settlements of {first:.3g} to {last:.3g} m"
     if settlement < first:
         return f"not reached: it is read at settlements of {first:.3g} to {last:.3g} m"
     return f"not known: none of --frames {a.frames} is at a settlement of {first:.3g} to {last:.3g} m"
@@ -208,10 +228,13 @@ def main(arguments: list[str] | None = None) -> int:
     factor, exact, name = collapse_factor(a, history), EXACT[a.shape, a.base], f"{a.base} {a.shape} footing"
     settlement, load = (history[column][-1] for column in ("settlement_m", "load_factor"))
     results = {
-        "bearing_capacity_factor": factor, "exact_factor": exact, "largest_load_factor": float(history["load_factor"].max()),
+        "bearing_capacity_factor": factor, "bearing_capacity_factor_read_at_settlements_m": read_between(a), "exact_factor": exact,
+        "largest_load_factor": float(history["load_factor"].max()),
         "settlement_m": settlement, "load_factor_in_the_end": load,
     }  # fmt: skip
-    said = f"{name}: N_c {factor_said(a, factor, settlement)}, exact {exact:.2f}; load factor {load:.2f} at a settlement of {settlement:.3g} m"
+    more = embedded(a) if factor is not None else ""
+    said = f"{name}: N_c {factor_said(a, factor, settlement)}, exact {exact:.2f} at the surface{more}; load factor {load:.2f} at a settlement "
+    said += f"of {settlement:.3g} m"
     return write_results(
         a, model, result, folder, results, said, begin=begin,
         movies=[particle_movie(name, scene, result.frames)],

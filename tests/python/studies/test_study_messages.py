@@ -79,7 +79,19 @@ def test_initial_stresses_are_described_in_a_line():
 def test_a_bearing_capacity_factor_that_is_not_known_says_why(options, settlement, said):
     study = importlib.import_module("footing_push")
     a = study.parse(options.split())
-    assert study.factor_said(a, None, settlement) == said and study.factor_said(a, 5.3, settlement) == "5.30"
+    assert study.factor_said(a, None, settlement) == said and study.factor_said(a, 5.3, settlement).startswith(
+        "5.30 at settlements of "
+    )
+
+
+@pytest.mark.parametrize("rigidity, percent", [(200, "12"), (700, "3.4"), (800, None), (2000, None)])
+def test_a_bearing_capacity_factor_of_an_embedded_footing_is_said_to_be_one(rigidity, percent):
+    """It is read up to a settlement of 24 / rigidity of the width, of which 3 % are too much."""
+    study = importlib.import_module("footing_push")
+    said = study.embedded(study.parse(["--rigidity", str(rigidity)]))
+    assert (
+        (f"embedded by up to {percent} % of its width" in said and "--rigidity 800" in said) if percent else said == ""
+    )
 
 
 def test_help_shows_one_default_of_an_option():
