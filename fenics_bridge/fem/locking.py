@@ -6,7 +6,7 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from mpm_core.law_warnings import angles_in_radians, locking, locks_at_failure
+from mpm_core.law_warnings import angles_in_radians, keeps_volume, locking, locks_at_failure
 
 from fenics_bridge import compat
 from fenics_bridge.mesh.tagged import cell_volumes
@@ -34,14 +34,21 @@ def warn_of_laws(model: QuasiStatic | Consolidation, instead: str = "elements of
 
 def warn_of_locking_at_failure(model: Any) -> None:
     """Warn where the soil keeps its volume as it fails, before a collapse load or a factor of safety is found. Collective."""
-    locks = _is_plain(model) and locks_at_failure(model.laws)  # on all ranks, since `laws` is collective
-    if locks and model.domain.comm.rank == 0:
-        warnings.warn(
+    laws = model.laws  # on all ranks, since it is collective
+    texts = []
+    if _is_plain(model) and locks_at_failure(laws):
+        texts.append(
             "linear elements without averaged strains are too strong for soil whose dilation angle is below its friction angle, "
-            "since it keeps its volume as it fails: take nmd=True, or elements of degree=2 or 4 (docs/locking.md)",
-            RuntimeWarning,
-            stacklevel=3,
+            "since it keeps its volume as it fails: take nmd=True, or elements of degree=2 or 4 (docs/locking.md)"
         )
+    if _is_quadratic_of_revolution(model) and (locks_at_failure(laws) or keeps_volume(laws)):
+        texts.append(
+            "quadratic elements of a body of revolution are up to a tenth too strong for soil that keeps its volume as it fails, the more "
+            "the coarser the mesh: take degree=4, or compare with smaller cells (docs/fem.md)"
+        )
+    for text in texts:
+        if model.domain.comm.rank == 0:
+            warnings.warn(text, RuntimeWarning, stacklevel=3)
 
 
 def warn_of_few_cells(model: Any, mechanism: fem.Function) -> None:
@@ -73,6 +80,10 @@ def warn_of_few_cells(model: Any, mechanism: fem.Function) -> None:
             RuntimeWarning,
             stacklevel=3,
         )
+
+
+def _is_quadratic_of_revolution(model: Any) -> bool:
+    return getattr(model, "degree", None) == 2 and getattr(model, "radius", None) is not None
 
 
 def _is_plain(model: Any) -> bool:

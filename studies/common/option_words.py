@@ -41,6 +41,7 @@ def in_options(text: str, parser: ArgumentParser | None) -> str:
             else of_degree,
             "elements of degree=2 or 4": of_degree,
             "degree=2": f"--elements {quadratic[0]}",
+            "degree=4": "--elements P4" if "P4" in elements else "degree=4",
             "nmd=True": "--elements P1-averaged" if averaged else "nmd=True",
         }
     if not words:
