@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from fenics_bridge import compat
 from fenics_bridge.mesh.walls import EDGES, ON_LINE, edges_on, is_along
 
+INNER: dict[int, tuple[float, ...]] = {1: (), 2: (0.5,), 4: (0.5 - np.sqrt(3 / 28), 0.5, 0.5 + np.sqrt(3 / 28))}
+"""Nodes within an edge by the degree of the elements, over its length: points of Gauss, Lobatto and Legendre"""
+
 
 def shared_nodes(domain: Any, line: NDArray[np.float64], degree: int) -> NDArray[np.float64] | None:
     """Nodes of finite elements on a line of the mesh, in the line's order; None where the mesh does not follow it. Collective.
@@ -20,7 +23,7 @@ def shared_nodes(domain: Any, line: NDArray[np.float64], degree: int) -> NDArray
     Args:
         domain: mesh of triangles; others are never followed.
         line: its corners [m], (k, 2).
-        degree: of the elements; from 2 on the middles of edges are nodes too.
+        degree: of the elements, which have nodes within their edges from 2 on.
 
     Returns:
         Positions [m], (n, 2), among them the corners of the line as they are given.
@@ -39,8 +42,8 @@ def shared_nodes(domain: Any, line: NDArray[np.float64], degree: int) -> NDArray
         places = _places(ends, start, end)
         if places is None:
             return None
-        if degree > 1:
-            places = np.sort(np.concatenate([places, (places[1:] + places[:-1]) / 2]))
+        inner = INNER[degree]
+        places = np.append((places[:-1, None] + np.outer(np.diff(places), [0.0, *inner])).ravel(), places[-1])
         parts.append(start + places[1:, None] * (end - start))
     return np.concatenate(parts)
 

@@ -18,6 +18,9 @@ ALONG = 0.7
 ON_LINE = 0.05
 """Distance of an end from the line of a beam that it is meant to be on, over the distance of the body's nodes there, at most"""
 
+COARSE = 1.5
+"""Distance of a beam's nodes over that of the body's beside them, above which the soil's nodes between them move on their own"""
+
 HELD = 0.99
 """Part of an end's motion by nodes that a support holds, at least, so that it counts as held"""
 
@@ -36,10 +39,24 @@ def warn_of_members(members: Members, held: NDArray[np.integer], before: set[str
         if name in before:
             continue
         of_beam = (rigid_beam(name, _rigid(one), "linear elements"), _hinge(name, one, is_held))
-        loose = _loose(members, name, one)
-        for text in (loose, *odd_units(name, one.member), *(of_beam if one.member.bending_stiffness else ())):
+        found = _loose(members, name, one), _coarse(members, name, one)
+        for text in (*found, *odd_units(name, one.member), *(of_beam if one.member.bending_stiffness else ())):
             if text and comm.rank == 0:
                 warnings.warn(text, RuntimeWarning, stacklevel=5)
+
+
+def _coarse(members: Members, name: str, one: Any) -> str:
+    """What a warning says of a beam whose spacing leaves nodes of the soil beside it free; empty without. Collective."""
+    if not one.member.bending_stiffness or one.member.spacing is None:
+        return ""
+    longest = float(np.linalg.norm(np.diff(one.nodes, axis=0), axis=1).max())
+    beside = members.node_distance(np.array(one.member.points))
+    if longest <= COARSE * beside:
+        return ""
+    return (
+        f"the beam {name!r} has nodes {longest:.3g} m apart, and the soil beside it has them every {beside:.3g} m: the soil moves between its "
+        "nodes, and fails there: give it a smaller spacing, or none"
+    )
 
 
 def _rigid(one: Any) -> float:

@@ -24,11 +24,12 @@ EDGES = LENGTH * np.linspace(0, 1, CELLS + 1) ** 1.5
 """Where its cells end [m]"""
 
 
-@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("degree", [1, 2, 4])
 def test_the_shear_force_of_a_beam_on_the_mesh_is_that_of_equilibrium(degree):
     """A beam on two supports under p has V = p (L / 2 - x): between two nodes there is what lies on one side of their middle.
 
-    Of a quadratic edge of the length h the middle carries 2/3 p h and each end p h / 6, so that V is off by p h / 12 at most.
+    Of a quadratic edge of the length h the middle carries 2/3 p h and each end p h / 6, so that V is off by p h / 12 at most, and
+    by less with the weights of Lobatto, 1/20, 49/180 and 16/45, at the nodes of degree 4.
     """
     pressure = 1e3
     domain, cell_tags, facet_tags = stretched()
@@ -72,3 +73,15 @@ def test_a_spacing_of_the_beam_is_kept():
     fem = bridge.QuasiStatic(domain, soil, facet_tags, [bridge.fixed(BOTTOM)], degree=2, cell_tags=cell_tags)
     fem.reconfigure(members={"beam": mpm.beam([(0.0, 0.5), (LENGTH, 0.5)], 1e8, 1e6, spacing=0.5)})
     assert np.allclose(fem.member_forces("beam").positions[:, 0], np.linspace(0, LENGTH, 9))
+
+
+@pytest.mark.parametrize(("spacing", "warns"), [(None, False), (0.2, False), (1.0, True)])
+def test_a_beam_whose_nodes_are_farther_apart_than_those_of_the_soil_is_a_warning(spacing, warns, recwarn):
+    """Quadratic elements of 0.5 m have nodes every 0.25 m."""
+    domain, cell_tags, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (4.0, 2.0), (8, 4))
+    soil = mpm.LinearElastic(young=1e6, poisson=0.0)
+    fem = bridge.QuasiStatic(domain, soil, facet_tags, [bridge.fixed(BOTTOM)], degree=2, cell_tags=cell_tags)
+    fem.reconfigure(members={"wall": mpm.beam([(2.0, 2.0), (2.0, 0.5)], 1e8, 1e6, spacing=spacing)})
+    said = [str(w.message) for w in recwarn if "soil moves between its nodes" in str(w.message)]
+    assert bool(said) == warns
+    assert not warns or "'wall' has nodes 0.75 m apart, and the soil beside it has them" in said[0]
