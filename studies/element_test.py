@@ -36,7 +36,7 @@ PRECONSOLIDATED = {"cam-clay": ("--preconsolidation", 1.0), "nor-sand": ("--imag
 """Laws that yield under an isotropic pressure, the options that set it, and how many times their value it is, attraction included"""
 TESTS = ("oedometer", "drained", "undrained", "shear", *CYCLIC)
 COLUMNS = ["axial_strain", "shear_strain", "volumetric_strain", "p_Pa", "q_Pa", "shear_stress_Pa",
-           "excess_pore_pressure_Pa", "plastic_strain"]  # fmt: skip
+           "excess_pore_pressure_Pa", "plastic_strain", "axial_stress_Pa", "lateral_stress_Pa"]  # fmt: skip
 OF_CYCLES = ["cycles", "axial_difference_Pa"]
 """Columns of cyclic tests only"""
 
@@ -158,7 +158,7 @@ def increment(kind: str, size: float) -> list[float | None]:
 
 
 def row(test: mpm.ElementTest) -> dict[str, float]:
-    """Quantities of interest: invariants of the effective stress where there is pore water, else of the stress."""
+    """Quantities of interest: of the effective stress where there is pore water, else of the stress, in compression."""
     names = test.law.state_names
     pore = test.state[names.index("excess_pore_pressure")] if "excess_pore_pressure" in names else 0.0
     p = -test.stress[:3].mean()
@@ -167,7 +167,8 @@ def row(test: mpm.ElementTest) -> dict[str, float]:
     return {
         "axial_strain": -test.strain[0], "shear_strain": test.strain[3], "volumetric_strain": -test.strain[:3].sum(),
         "p_Pa": p - pore, "q_Pa": q, "shear_stress_Pa": test.stress[3], "excess_pore_pressure_Pa": pore,
-        "plastic_strain": test.state[0],
+        "plastic_strain": test.state[0], "axial_stress_Pa": -test.stress[0] - pore,
+        "lateral_stress_Pa": -test.stress[1:3].mean() - pore,
     }  # fmt: skip
 
 
@@ -201,6 +202,14 @@ def run_cycles(test: mpm.ElementTest, a: Namespace, history: History) -> str | N
     return None
 
 
+def stiffness(history: History) -> dict[str, float | None]:
+    """Of an oedometer test: ratio of lateral to axial stress in the end, and tangent modulus of the last increment [Pa]."""
+    axial, lateral, strain = (history[name] for name in ("axial_stress_Pa", "lateral_stress_Pa", "axial_strain"))
+    ratio = float(lateral[-1] / axial[-1]) if axial[-1] != 0 else None
+    modulus = float((axial[-1] - axial[-2]) / (strain[-1] - strain[-2])) if len(axial) > 1 else None
+    return {"lateral_over_axial_stress": ratio, "tangent_oedometer_modulus_Pa": modulus}
+
+
 def milestones(history: History, a: Namespace) -> dict[str, float | None]:
     """Numbers of cycles until soil counts as liquefied, by the usual criteria; None where it does not."""
     strain = history["shear_strain" if a.test == "cyclic-shear" else "axial_strain"]
@@ -214,7 +223,10 @@ def milestones(history: History, a: Namespace) -> dict[str, float | None]:
 
 
 def draw(history: History, a: Namespace, path: Path) -> None:
-    """Stress path, stress over strain, and volume over strain, or pore pressure, or the mean stress where volume is kept."""
+    """Stress path, stress over strain, and volume over strain, or pore pressure, or the mean stress where volume is kept.
+
+    In an oedometer the volumetric strain is the axial one, and is drawn over the axial stress.
+    """
     if a.test in CYCLIC:
         return draw_cycles(history, a.test, path)
     shear = a.test == "shear"
@@ -226,6 +238,9 @@ def draw(history: History, a: Namespace, path: Path) -> None:
         last = ("p_Pa", 1e-3, "$p'$ [kPa]")  # the volume is kept
     else:
         last = ("volumetric_strain", 1.0, "Volumetric strain, compression [-]")
+    third = strain, history[last[0]] * last[1], strain_label, last[2]
+    if a.test == "oedometer" and last[0] == "volumetric_strain":
+        third = history["axial_stress_Pa"] * 1e-3, strain, "Axial stress [kPa]", strain_label
     panels = [
         (history["p_Pa"] * 1e-3, history["q_Pa"] * 1e-3, "$p'$ [kPa]", "$q$ [kPa]"),
         (
@@ -234,7 +249,7 @@ def draw(history: History, a: Namespace, path: Path) -> None:
             strain_label,
             "Shear stress [kPa]" if shear else "$q$ [kPa]",
         ),
-        (strain, history[last[0]] * last[1], strain_label, last[2]),
+        third,
     ]
     with curve_figure(path, (10, 3.2), panels=3) as axes:
         for ax, (x, y, x_label, y_label) in zip(axes, panels, strict=True):
@@ -261,7 +276,14 @@ def main(arguments: list[str] | None = None) -> int:
         stopped = run(test, a, history)
     end = {name: float(history[name][-1]) for name in columns}
     end |= milestones(history, a) if a.test in CYCLIC else {}
-    summary = {"finished_run": stopped is None, "stopped_because": stopped, "steps": len(history) - 1, **end}
+    of_oedometer = stiffness(history) if a.test == "oedometer" else {}
+    summary = {
+        "finished_run": stopped is None,
+        "stopped_because": stopped,
+        "steps": len(history) - 1,
+        **end,
+        **of_oedometer,
+    }
     if stopped is None and not too_soft(a, law):
         say(not_yielded(a, end["plastic_strain"]))
         say(never_cycled(a, end.get("cycles", 0.0)))
@@ -270,6 +292,11 @@ def main(arguments: list[str] | None = None) -> int:
     said = f"{a.test}: p' {end['p_Pa'] / 1e3:.4g} kPa, q {end['q_Pa'] / 1e3:.4g} kPa, largest q {largest / 1e3:.4g} kPa"
     if "shear" in a.test:
         said += f", largest shear stress {np.abs(history['shear_stress_Pa']).max() / 1e3:.4g} kPa"
+    if of_oedometer.get("tangent_oedometer_modulus_Pa") is not None:
+        said += (
+            f"; axial stress {end['axial_stress_Pa'] / 1e3:.4g} kPa, lateral {end['lateral_stress_Pa'] / 1e3:.4g} kPa, tangent modulus "
+            f"{of_oedometer['tangent_oedometer_modulus_Pa'] / 1e6:.4g} MPa"
+        )
     return write_summary(folder, a, summary, pictures=pictures, said=said)
 
 

@@ -21,6 +21,19 @@ def test_drained_triaxial_test_ends_at_the_strength(tmp_path):
     assert all((tmp_path / name).stat().st_size > 0 for name in ("stress_path.png", "history.csv"))
 
 
+def test_an_oedometer_test_gives_the_modulus_and_the_stresses(tmp_path):
+    """In elastic soil E (1 - nu) / ((1 + nu) (1 - 2 nu)) = 1.2 E and nu / (1 - nu) = 1/3 of nu = 1/4: from 10 kPa by 12 and 4 kPa at 1 %."""
+    options = "--test oedometer --material elastic --young 1e6 --poisson 0.25 --pressure 10e3 --strain 0.01 --steps 4"
+    result = ended("element_test", tmp_path, *options.split())
+    assert result.returncode == 0, result.stderr
+    found = summary(tmp_path)
+    assert found["tangent_oedometer_modulus_Pa"] == pytest.approx(1.2e6, rel=1e-9)
+    assert found["axial_stress_Pa"] == pytest.approx(22e3, rel=1e-9)
+    assert found["lateral_stress_Pa"] == pytest.approx(14e3, rel=1e-9)
+    assert found["lateral_over_axial_stress"] == pytest.approx(14 / 22, rel=1e-9)
+    assert "axial stress 22 kPa, lateral 14 kPa, tangent modulus 1.2 MPa" in result.stdout
+
+
 def test_the_shear_strength_of_clay_is_said_after_simple_shear(tmp_path):
     result = ended("element_test", tmp_path, *"--test shear --material tresca --cohesion 20e3 --young 20e6".split())
     assert result.returncode == 0 and "largest shear stress 20 kPa" in result.stdout
