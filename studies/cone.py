@@ -30,6 +30,7 @@ from common.quiet import GATHERS, without_warning
 from common.ranks import run_study
 from common.results import ROOT, open_results
 from common.scenes import scene_of
+from common.site_laws import unit_doubt
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -80,6 +81,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
           f"--friction-angle, {a.friction_angle:g} degrees, at most")  # fmt: skip
     inside = 2.5 * a.radius * (way(a) + 1.5 * a.radius) / (a.coarsening * a.cell_size) ** 2
     check_cells(p, a, 2.3 * (inside + 12 * way(a) / a.cell_size), "--cell-size", "--radius", "--penetration")
+    say(unit_doubt({"shear_strength" if a.friction_angle == 0 else "cohesion": a.strength}, "the soil"))
     check_restart(p, a, MAY_CHANGE)
     say(beyond_factors(a.rigidity) if a.friction_angle == 0 else "")
     return a

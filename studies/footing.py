@@ -11,13 +11,14 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from common.checks import check_cells
+from common.checks import check_cells, say
 from common.collapse_runs import CAPTIONS, CollapseRuns, Target, add_flow_options, dilation_angles
 from common.figures import Pictures
 from common.options import add_count, add_number, check, study_parser
 from common.page import Page
 from common.ranks import run_study
 from common.results import ROOT, open_results
+from common.site_laws import unit_doubt
 from common.slope_case import soil_of
 from common.slope_fem import add_element_options, finite_elements, step_line
 from common.summary import write_summary
@@ -67,6 +68,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
                   f"{options.friction_angle:g} degrees")  # fmt: skip
     check(p, options.cell_size <= options.half_width,
           lambda: f"--cell-size is {options.cell_size:g}, expected at most --half-width")  # fmt: skip
+    say(unit_doubt({"young": options.young, "cohesion": options.cohesion}, "the ground"))
     check_cells(p, options, 10 * (options.half_width / options.cell_size) ** 2, "--cell-size", "--half-width")
     return options
 

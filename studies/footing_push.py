@@ -18,7 +18,7 @@ from time import perf_counter
 import numpy as np
 from common.body_runs import MAY_CHANGE, BodyRun, add_body_run_options, body_pictures, follow, mean_force, write_results
 from common.checkpoint import check_restart
-from common.checks import check_cells
+from common.checks import check_cells, say
 from common.figures import Pictures, curve_figure
 from common.history import History
 from common.movie import particle_movie
@@ -27,6 +27,7 @@ from common.plots import CURVES, Scene
 from common.ranks import run_study
 from common.results import ROOT, open_results
 from common.scenes import scene_of
+from common.site_laws import unit_doubt
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -84,6 +85,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
           f"{a.half_width:g} m, at most")  # fmt: skip
     inside = 2.5 * a.half_width * (a.penetration + 1.5 * a.half_width) / (a.coarsening * a.cell_size) ** 2
     check_cells(p, a, 2.3 * (inside + 12 * a.penetration / a.cell_size), "--cell-size", "--half-width", "--penetration")
+    say(unit_doubt({"shear_strength": a.strength}, "the clay"))
     check_restart(p, a, MAY_CHANGE)
     return a
 

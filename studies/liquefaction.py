@@ -22,7 +22,7 @@ import numpy as np
 from common import body_runs
 from common.body_runs import BodyRun, follow
 from common.checkpoint import check_restart
-from common.checks import check_cells, check_effect
+from common.checks import check_cells, check_effect, say
 from common.figures import Pictures, curve_figure
 from common.front import front
 from common.history import History
@@ -34,6 +34,7 @@ from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
 from common.schemes import INTEGRATIONS
+from common.site_laws import unit_doubt
 from common.soils import add_parameter
 from mpi4py import MPI
 
@@ -103,6 +104,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
         "--crest",
         "--runout-length",
     )
+    say(unit_doubt({"young": a.young}, "the sand"))
     check_restart(p, a, body_runs.MAY_CHANGE)
     return a
 

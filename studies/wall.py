@@ -30,7 +30,9 @@ from common.quiet import GATHERS, without_warning
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
+from common.site_laws import unit_doubt
 from mpi4py import MPI
+from mpm_core.input_warnings import in_radians
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -105,6 +107,8 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check_cells(p, a, 15 / a.cell_size**2, "--cell-size")
     say(f"--cell-size is {a.cell_size:g} of the height of the wall: active earth pressures are a quarter too low on an eighth, and half "
         "of what they should be on a quarter; take 0.1 or less" * (a.motion == "active" and a.cell_size > 0.1))  # fmt: skip
+    say(in_radians("--wall-friction-angle", a.wall_friction_angle))
+    say(unit_doubt({"young": a.young}, "the sand"))
     say(stands_alone(a))
     if a.movement is None:
         a.movement = 0.03 if a.motion == "passive" else 0.008

@@ -94,6 +94,26 @@ def test_a_bearing_capacity_factor_of_an_embedded_footing_is_said_to_be_one(rigi
     )
 
 
+@pytest.mark.parametrize("study, options, said", [
+    ("wall", "--wall-friction-angle 0.35", "--wall-friction-angle is 0.35 degrees; angles are in degrees, and 0.35 rad are 20.1"),
+    ("wall", "--young 10e3", "the sand: young is 10000 Pa, which hardly any soil has"),
+    ("wall", "--wall-friction-angle 20", ""),
+    ("footing", "--cohesion 20", "the ground: cohesion is 20 Pa"),
+    ("footing", "--young 20e3", "the ground: young is 20000 Pa"),
+    ("footing", "", ""),
+    ("footing_push", "--strength 20", "the clay: shear_strength is 20 Pa"),
+    ("footing_push", "", ""),
+    ("cone", "--strength 20", "the soil: shear_strength is 20 Pa"),
+    ("cone", "", ""),
+    ("liquefaction", "--young 10e3", "the sand: young is 10000 Pa"),
+    ("liquefaction", "", ""),
+])  # fmt: skip
+def test_values_that_are_probably_in_other_units_are_a_warning(study, options, said, recwarn):
+    importlib.import_module(study).parse(options.split())
+    text = " ".join(str(one.message) for one in recwarn)
+    assert said in text if said else "hardly any soil" not in text and "angles are in degrees" not in text
+
+
 def test_help_shows_one_default_of_an_option():
     text = " ".join(importlib.import_module("retrogression").parser().format_help().split())
     assert "length of the level crest [m] (default: 30)" in text and "1.1 times the height" not in text
