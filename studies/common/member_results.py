@@ -30,7 +30,10 @@ HOOPS = ("hoop_force_N_per_m", "hoop_moment_N_m_per_m")
 """Further columns of members of axisymmetric bodies"""
 LEGEND_COLUMNS = 4
 """Stages beside one another in the legend of a beam"""
-BEAM = "displacement across its line, bending moment, shear force and axial force"
+BEAM = (
+    "displacement across its line, bending moment, shear force and axial force; tension is positive, and so is a moment by which the left "
+    "side, seen from the first point of the line to its last, is compressed"
+)
 
 
 @dataclass

@@ -252,7 +252,18 @@ def _made(points: Any, axial_stiffness: float, **values: Any) -> Member:
         raise InputError(
             "tensile_strength and compressive_strength are 0, expected one above it: the member carries nothing"
         )
-    prestress = within("prestress", member.prestress, -member.compressive_strength, member.tensile_strength)
+    prestress = within("prestress", member.prestress, -math.inf, math.inf)
+    for name, limit in (
+        ("tensile_strength", member.tensile_strength),
+        ("compressive_strength", member.compressive_strength),
+    ):
+        force = prestress if name == "tensile_strength" else -prestress
+        if force > limit:
+            kind = name.split("_")[0]
+            raise InputError(
+                f"prestress is {prestress:g} N/m, expected a {kind} force up to {name}, {limit:g} N/m; tension is positive, and a strut that is "
+                "pressed against a wall has a negative prestress"
+            )
     if math.isinf(prestress):
         raise InputError(f"prestress is {prestress}, expected a finite number")
     if member.closed and (member.clamped_start or member.clamped_end):

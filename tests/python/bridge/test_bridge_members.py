@@ -304,7 +304,7 @@ def test_the_stiffness_of_a_bar_that_slips_is_the_derivative_of_its_forces():
         (lambda: mpm.bar([(0, 0), (1, 0)], 0.0), "axial_stiffness is 0.0 N/m, expected a positive number"),
         (lambda: mpm.bar([(0, 0), (1, 0)], 1e6, tensile_strength=-1.0), "tensile_strength is -1.0"),
         (lambda: mpm.bar([(0, 0), (1, 0)], 1e6, tensile_strength=0.0, compressive_strength=0.0), "carries nothing"),
-        (lambda: mpm.bar([(0, 0), (1, 0)], 1e6, tensile_strength=1e3, prestress=2e3), "prestress is 2000.0"),
+        (lambda: mpm.bar([(0, 0), (1, 0)], 1e6, tensile_strength=1e3, prestress=2e3), "prestress is 2000 N/m"),
         (lambda: mpm.bar([(0, 0), (1, 0)], 1e6, spacing=-1.0), "spacing is -1.0 m"),
         (lambda: mpm.bar([(0, 0), (1, 0)], 1e6, bond_strength=-1.0), "bond_strength is -1.0"),
         (

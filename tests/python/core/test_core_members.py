@@ -329,6 +329,14 @@ def test_members_of_which_one_does_not_fit_are_not_installed():
     short = mpm.MemberForces(np.array([(1.1, 0.6), (1.2, 0.6), (1.4, 0.6)]), np.zeros((3, 2)), np.ones(1), np.zeros(3))
     with pytest.raises(mpm.InputError, match=r"forces: axial_force of 'near' has shape \(1,\), expected \(2,\)"):
         model.install({"near": near}, {"near": short})
+    with pytest.raises(
+        mpm.InputError, match="prestress is 5000 N/m, expected a tensile force up to tensile_strength, 0 N/m"
+    ):
+        mpm.strut((0, 0), (1, 0), 1e8, tensile_strength=0.0, prestress=5e3)
+    with pytest.raises(
+        mpm.InputError, match="expected a compressive force up to compressive_strength, 2000 N/m; tension is"
+    ):
+        mpm.strut((0, 0), (1, 0), 1e8, compressive_strength=2e3, prestress=-5e3)
     with pytest.raises(mpm.InputError, match="prestress is inf, expected a finite number"):
         mpm.bar([(0, 0), (1, 0)], 5e6, prestress=math.inf)
 
