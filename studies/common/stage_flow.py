@@ -76,7 +76,7 @@ def warn_of_heave(row: Mapping[str, Any], unit_weights: Sequence[float]) -> None
         unit_weights: of the soils that are there [N/m3].
     """
     gradient, critical = row.get("largest_upward_exit_gradient", 0.0), min(unit_weights) / WATER_WEIGHT - 1
-    if gradient > critical:
+    if gradient > max(critical, 0.0):  # where no water leaves upwards, soil that is lighter than water is there too
         say(f"stage {row['stage']!r}: water leaves the ground upwards with a gradient of {gradient:.2f}, above the critical one of "
             f"{critical:.2f} of soil of {min(unit_weights) / 1e3:.3g} kN/m3: it lifts soil without cohesion (hydraulic heave)")  # fmt: skip
 

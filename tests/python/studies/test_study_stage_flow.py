@@ -191,3 +191,10 @@ def test_water_that_leaves_sideways_lifts_no_soil(sideways, upward, said, recwar
     row = {"stage": "cut", "largest_exit_gradient": sideways, "largest_upward_exit_gradient": upward}
     warn_of_heave(row, [20e3])
     assert any("hydraulic heave" in str(one.message) for one in recwarn) == said
+
+
+@pytest.mark.parametrize("row", [{}, {"largest_exit_gradient": 0.5, "largest_upward_exit_gradient": 0.0}])
+def test_no_water_that_leaves_upwards_lifts_no_soil_that_is_lighter_than_water(row, recwarn):
+    """Weightless soil of a hand calculation, or blocks of foam of 0.3 kN/m3 in a dry fill, have a critical gradient below 0."""
+    warn_of_heave({"stage": "load", **row}, [20e3, 300.0, 0.0])
+    assert not [one for one in recwarn if "hydraulic heave" in str(one.message)]
