@@ -16,7 +16,7 @@ from scipy import sparse
 from fenics_bridge import compat
 from fenics_bridge.structures.bond import bond_strengths, slip_tangent
 from fenics_bridge.structures.embedding import Embedding, cell_sizes_along
-from fenics_bridge.structures.line_nodes import shared_nodes
+from fenics_bridge.structures.line_nodes import runs_beside, shared_nodes
 from fenics_bridge.structures.unknowns import Unknowns
 from mpm_core import _core
 
@@ -39,6 +39,8 @@ class _Installed:
     """Matrix of the displacements of the nodes by the unknowns of the body (n D, unknowns)"""
     strain: Any = None
     """Matrix of the strains by the unknowns of the body (k, unknowns)"""
+    beside: bool = False
+    """Whether it goes along edges of the mesh, and has other nodes than these"""
 
     def stiffness(self) -> NDArray[np.float64]:
         """Elastic stiffness of each strain: (k,)."""
@@ -261,7 +263,8 @@ class Members:
         shared = shared_nodes(self._space.mesh, np.array(member.points), degree) if bends_freely else None
         nodes = member.nodes(size / min(2, degree) or member.length) if shared is None else shared
         strains = member.strains(nodes, self._of_revolution)
-        one = _Installed(member, nodes, strains, np.zeros(0), None, member.prestress != 0)
+        beside = bends_freely and shared is None and runs_beside(self._space.mesh, np.array(member.points), size)
+        one = _Installed(member, nodes, strains, np.zeros(0), None, member.prestress != 0, beside=beside)
         one.force = one.unstrained()
         return one
 

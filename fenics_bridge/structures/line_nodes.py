@@ -8,10 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenics_bridge import compat
-from fenics_bridge.mesh.walls import EDGES, ON_LINE, edges_on, is_along
+from fenics_bridge.mesh.walls import EDGES, ON_LINE, distance_from, edges_on, is_along
 
 INNER: dict[int, tuple[float, ...]] = {1: (), 2: (0.5,), 4: (0.5 - np.sqrt(3 / 28), 0.5, 0.5 + np.sqrt(3 / 28))}
 """Nodes within an edge by the degree of the elements, over its length: points of Gauss, Lobatto and Legendre"""
+
+BESIDE = 0.05
+"""Distance from a line up to which corners of cells are beside it, over the size of the cells"""
+MANY = 0.7
+"""Corners beside a line, over the number of cells along it, from which on the line goes along edges of the mesh"""
 
 
 def shared_nodes(domain: Any, line: NDArray[np.float64], degree: int) -> NDArray[np.float64] | None:
@@ -46,6 +51,25 @@ def shared_nodes(domain: Any, line: NDArray[np.float64], degree: int) -> NDArray
         places = np.append((places[:-1, None] + np.outer(np.diff(places), [0.0, *inner])).ravel(), places[-1])
         parts.append(start + places[1:, None] * (end - start))
     return np.concatenate(parts)
+
+
+def runs_beside(domain: Any, line: NDArray[np.float64], size: float) -> bool:
+    """Whether a line goes along edges of a mesh without following them, as two polygons of one circle do. Collective.
+
+    The corners of cells that the line cuts as it comes are hardly ever that near to it.
+
+    Args:
+        domain: mesh of triangles; of others it is false.
+        line: its corners [m], (k, 2).
+        size: of the cells along it [m].
+    """
+    if domain.geometry.dim != 2 or line.shape[1] != 2 or size == 0:
+        return False
+    points = domain.geometry.x[:, :2]
+    near = points[distance_from(points, line) <= BESIDE * size]
+    found = np.round(np.concatenate(domain.comm.allgather(near)) / (1e-3 * size))
+    length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    return bool(len(np.unique(found, axis=0)) > MANY * length / size)
 
 
 def _places(

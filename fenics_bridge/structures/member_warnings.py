@@ -39,7 +39,7 @@ def warn_of_members(members: Members, held: NDArray[np.integer], before: set[str
         if name in before:
             continue
         of_beam = (rigid_beam(name, _rigid(one), "linear elements"), _hinge(name, one, is_held))
-        found = _loose(members, name, one), _coarse(members, name, one)
+        found = _loose(members, name, one), _coarse(members, name, one), _beside(name, one)
         for text in (*found, *odd_units(name, one.member), *(of_beam if one.member.bending_stiffness else ())):
             if text and comm.rank == 0:
                 warnings.warn(text, RuntimeWarning, stacklevel=5)
@@ -56,6 +56,16 @@ def _coarse(members: Members, name: str, one: Any) -> str:
     return (
         f"the beam {name!r} has nodes {longest:.3g} m apart, and the soil beside it has them every {beside:.3g} m: the soil moves between its "
         "nodes, and fails there: give it a smaller spacing, or none"
+    )
+
+
+def _beside(name: str, one: Any) -> str:
+    """What a warning says of a beam whose nodes are near those of the mesh, but others; empty without."""
+    if not one.beside:
+        return ""
+    return (
+        f"the beam {name!r} goes along edges of the mesh, but its corners are not nodes of the mesh: its axial and shear forces jump from segment "
+        "to segment, around the right ones; give its line the nodes of the mesh, as by a transfinite curve of gmsh with as many parts"
     )
 
 

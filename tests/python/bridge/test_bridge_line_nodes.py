@@ -85,3 +85,41 @@ def test_a_beam_whose_nodes_are_farther_apart_than_those_of_the_soil_is_a_warnin
     said = [str(w.message) for w in recwarn if "soil moves between its nodes" in str(w.message)]
     assert bool(said) == warns
     assert not warns or "'wall' has nodes 0.75 m apart, and the soil beside it has them" in said[0]
+
+
+def ring(parts):
+    """Corners of a ring of the radius 1 m about (2, 2) m."""
+    angle = np.linspace(0, 2 * np.pi, parts + 1)
+    return 2.0 + np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+@pytest.mark.parametrize(("parts", "beside"), [(40, False), (36, True), (52, True)])
+def test_a_ring_of_other_parts_than_those_of_the_mesh_is_a_warning(parts, beside, recwarn, tmp_path):
+    """The mesh has a circle of 40 parts, of which the chords are 3 mm away from the arc and 157 mm long."""
+    (tmp_path / "ring.geo").write_text(
+        """
+        SetFactory("OpenCASCADE");
+        Rectangle(1) = {0, 0, 0, 4, 4};
+        Disk(2) = {2, 2, 0, 1};
+        BooleanFragments{ Surface{1, 2}; Delete; }{}
+        Physical Surface("soil") = {Surface{:}};
+        Physical Curve("base") = {Curve In BoundingBox{-0.01, -0.01, -0.01, 4.01, 0.01, 0.01}};
+        circle() = Curve In BoundingBox{0.9, 0.9, -0.01, 3.1, 3.1, 0.01};
+        Transfinite Curve{circle()} = 41;
+        Mesh.MeshSizeMax = 0.4;
+    """
+    )
+    domain, cell_tags, facet_tags = bridge.read_mesh(tmp_path / "ring.geo", MPI.COMM_WORLD)
+    soil = mpm.LinearElastic(young=1e6, poisson=0.0)
+    fem = bridge.QuasiStatic(domain, soil, facet_tags, [bridge.fixed("base")], degree=2, cell_tags=cell_tags)
+    fem.reconfigure(members={"lining": mpm.beam(ring(parts), 1e9, 1e6)})
+    assert bool([w for w in recwarn if "'lining' goes along edges of the mesh, but its" in str(w.message)]) == beside
+    assert (len(fem.member_forces("lining").positions) == 2 * 40 + 1) == (not beside)
+
+
+def test_a_beam_across_cells_goes_along_no_edges(recwarn):
+    domain, cell_tags, facet_tags = stretched()
+    soil = mpm.LinearElastic(young=1e6, poisson=0.0)
+    fem = bridge.QuasiStatic(domain, soil, facet_tags, [bridge.fixed(BOTTOM)], degree=2, cell_tags=cell_tags)
+    fem.reconfigure(members={"beam": mpm.beam([(0.1, 0.13), (3.7, 0.41)], 1e8, 1e6)})
+    assert not [w for w in recwarn if "goes along edges" in str(w.message)]
