@@ -27,6 +27,7 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from fenics_bridge.fem.locking import warn_of_locking_at_failure
 
 comm = MPI.COMM_WORLD
 COMPARED = {
@@ -102,6 +103,8 @@ def main(arguments: list[str] | None = None) -> int:
     site = read_site(a.site, comm, a.cell_size, needed=("stages",))
     folder = open_results(a, comm)
     run = carry_out(site, int(a.elements[1]), folder, comm)
+    if a.elements == "P1":
+        warn_of_locking_at_failure(run.site.fem)
     compared = (
         comparison(site, run.site)
         if a.compare

@@ -214,3 +214,17 @@ def test_the_lining_of_a_shaft_has_hoop_forces(tmp_path):
     assert all(abs(float(row["hoop_moment_N_m_per_m"])) < 1.0 for row in rows)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["stages"][-1]["wall_hoop_force_N_per_m"] < float(middle["hoop_force_N_per_m"])
+
+
+@pytest.mark.usefixtures("without_pictures")
+@pytest.mark.parametrize(("elements", "warns"), [("P1", True), ("P2", False)])
+def test_linear_elements_of_an_excavation_in_sand_that_dilates_little_are_a_warning(elements, warns, recwarn, tmp_path):
+    """The wall of a pit in sand of 32 degrees has four fifths of the moment and two thirds of the displacement in them."""
+    options = f"--site {site_in(tmp_path)} --cell-size 4 --elements {elements} --output {tmp_path / 'out'}"
+    importlib.import_module("excavation").main(options.split())
+    said = [
+        str(one.message)
+        for one in recwarn
+        if "are too strong for soil whose dilation angle is below" in str(one.message)
+    ]
+    assert bool(said) == warns
