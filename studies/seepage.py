@@ -16,6 +16,7 @@ from common.discharge import extent_of, in_words, inflow_column, inflows
 from common.field_files import FieldFiles
 from common.field_plots import save_curves
 from common.figures import Pictures
+from common.flow_doubts import warn_of_sealed_ground
 from common.flow_steps import FlowSteps
 from common.options import add_count, add_number, add_switch, study_parser
 from common.page import Page
@@ -159,6 +160,7 @@ def main(arguments: list[str] | None = None) -> int:
     flow = site.seepage(int(a.elements[1]))
     names = [c.facet_tag for c in site.boundary]
     flow.solve()
+    warn_of_sealed_ground(flow, site.ground, site.walls, f"{a.site}: boundaries")
     extent, steady = extent_of(flow), inflows(flow, names)
     dry = warn_of_suction(flow, site.soils, site.cell_tags, a.site)
     pictures, stopped = [flow_picture(flow, "Steady flow at the beginning", members=site.walls)], None

@@ -1,4 +1,4 @@
-"""Warnings of what is probably a mistake in stages of steady flow: pressures that are kept, sealed ground, reservoirs below it."""
+"""Warnings of what is probably a mistake in a steady flow: ground that is sealed, and in stages pressures that are kept and low reservoirs."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ def warn_of_kept_flow(
             "of water that stands there: give it steady_flow = true or a water_level")  # fmt: skip
 
 
-def warn_of_sealed_ground(flow: water.Seepage, ground: Any, walls: Iterable[mpm.Member], where: str) -> None:
+def warn_of_sealed_ground(flow: water.Seepage, ground: Any, walls: Iterable[np.ndarray], where: str) -> None:
     """Warn of ground that water presses against from below, where no boundary has a condition. Collective.
 
     Args:
         flow: the flow, solved.
         ground: mesh of all soils that are there, also of those that hold no water, without walls.
-        walls: members that hold the water back.
-        where: the stage stands in the file.
+        walls: lines (n, 2) of the members that hold the water back [m].
+        where: the flow is described, for the message.
     """
     domain, comm = flow.domain, flow.domain.comm
     taken = [flow.facet_tags.find(n) for one in flow.boundary for n in bridge.names_of(flow.facet_tags)[one.facet_tag]]
@@ -61,7 +61,7 @@ def warn_of_sealed_ground(flow: water.Seepage, ground: Any, walls: Iterable[mpm.
     close = 1e-6 * (high - low)
     free = np.isin(np.round(closed / close) @ (1, 1j), np.round(open_air / close) @ (1, 1j))
     for wall in walls:
-        free &= distance_from(closed, np.array(wall.points)) > close
+        free &= distance_from(closed, wall) > close
     closed = closed[free]
     pressure = flow.pore_pressure()(closed - (0.0, close))
     found = [part for part in comm.allgather((pressure, closed)) if len(part[0])]
@@ -71,9 +71,9 @@ def warn_of_sealed_ground(flow: water.Seepage, ground: Any, walls: Iterable[mpm.
     worst = int(np.argmax(pressure))
     if pressure[worst] > SEALED * (high - low) * flow.unit_weight:
         x, y = closed[worst]
-        say(f"{where}: steady_flow: no boundary has a condition at the ground at x = {x:.4g} m, y = {y:.4g} m, where the water has a pressure of "
+        say(f"{where}: no boundary has a condition at the ground at x = {x:.4g} m, y = {y:.4g} m, where the water has a pressure of "
             f"{pressure[worst] / 1e3:.3g} kPa: no water leaves there, and as much presses on the ground as if water stood on it; give that boundary "
-            "seepage_face = true or a reservoir")  # fmt: skip
+            "seepage_face = true or a reservoir, or flux = 0.0 where a structure or tight soil above seals it")  # fmt: skip
 
 
 def warn_of_low_reservoirs(domain: Any, facets: Any, boundary: Iterable[Any], where: str) -> None:

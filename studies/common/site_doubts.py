@@ -71,7 +71,12 @@ def warn_of_flooded_ground(domain: Any, facet_tags: Any, boundary: Iterable[Any]
     if not reservoirs:
         return
     wet = [tagged_facets(domain.comm, facet_tags, condition.facet_tag, "boundary") for condition in reservoirs]
-    dry = upward_facets(domain, np.setdiff1d(exterior_facet_indices(domain.topology), np.concatenate(wet)))
+    sealed = [
+        tagged_facets(domain.comm, facet_tags, condition.facet_tag, "boundary")
+        for condition in boundary
+        if isinstance(condition, water.Flux)  # of a structure, if it is zero
+    ]
+    dry = upward_facets(domain, np.setdiff1d(exterior_facet_indices(domain.topology), np.concatenate([*wet, *sealed])))
     dry = np.concatenate(domain.comm.allgather(dry))
     for condition, facets in zip(reservoirs, wet, strict=True):
         level = max(levels_of(condition))
@@ -83,7 +88,8 @@ def warn_of_flooded_ground(domain: Any, facet_tags: Any, boundary: Iterable[Any]
         if low.any():
             x, y = dry[low][0].mean(axis=0)
             say(f"{path}: the reservoir of {condition.facet_tag!r} rises to {level:g} m, above the ground beside it at x = {x:.4g} m, y = {y:.4g} m, "
-                "which is not part of a reservoir: no water stands on it or enters there; lower the level, or give that boundary a reservoir")  # fmt: skip
+                "which is not part of a reservoir: no water stands on it or enters there; lower the level, or give that boundary a reservoir, or "
+                "flux = 0.0 where a structure seals it")  # fmt: skip
 
 
 def upward_facets(domain: Any, facets: np.ndarray) -> np.ndarray:

@@ -127,7 +127,9 @@ def with_steady_flow(
             try:
                 pressure = _flow(mesh, soils, list(boundary.values()), walls, path, where, geometry)
                 stage, flowing = replace(stage, pore_pressure=pressure), True
-                warn_of_sealed_ground(pressure.flow, bridge.soil_mesh(*mesh, tag=there)[0], walls.values(), where)
+                ground = bridge.soil_mesh(*mesh, tag=there)[0]
+                lines = [np.array(wall.points) for wall in walls.values()]
+                warn_of_sealed_ground(pressure.flow, ground, lines, f"{where}: steady_flow")
             except (mpm.InputError, RuntimeError) as error:
                 raise mpm.InputError(f"{where}: steady_flow: {error}") from None
         elif "water_level" in row:

@@ -42,6 +42,7 @@ class WaterSite:
     """A site of seepage as its file describes it, on its mesh.
 
     soils: {name: PorousSoil}; boundary: of `fenics_bridge.water`; varies: whether any value changes in time
+    ground: mesh of all soils, also of those that hold no water, without walls
     walls: lines (n, 2) of the members that hold water back [m]; geometry: plane section or axial symmetry
     """
 
@@ -51,6 +52,7 @@ class WaterSite:
     soils: dict[str, water.PorousSoil]
     boundary: list
     varies: bool
+    ground: Any
     walls: list[np.ndarray]
     geometry: mpm.Geometry | None = None
 
@@ -132,10 +134,11 @@ def read_water_site(path: Path, comm: MPI.Comm, cell_size: float | None = None) 
     members = [member_of(given, f"{path}: members.{name}") for name, given in table.get("members", {}).items()]
     walls = [np.array(member.points) for member in members if member.impervious]
     body = bridge.soil_mesh(*mesh, tag=list(wet), walls=walls) if walls else part_of_mesh(mesh, wet)
+    ground = part_of_mesh(mesh, soils)[0] if dry or walls else body[0]
     boundary = list(boundary_of(table, path).values())
     warn_of_reservoirs(body[0], boundary, path)
     warn_of_flooded_ground(body[0], body[2], boundary, path)
-    return WaterSite(*body, wet, boundary, bool(times_of(boundary)), walls, geometry)
+    return WaterSite(*body, wet, boundary, bool(times_of(boundary)), ground, walls, geometry)
 
 
 def read_water_table(path: Path, needed: Sequence[str]) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from fenics_bridge import water
 
 from .checks import say
 from .collapse_runs import UNDECIDED
+from .flow_doubts import warn_of_sealed_ground
 from .lengths import metres
 from .page import Page
 from .quiet import NOT_REACHED, without_warning
@@ -64,6 +65,7 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
     folder = open_results(a, comm)
     flow = slope.seepage()
     flow.solve()
+    warn_of_sealed_ground(flow, slope.body[0], (), f"{a.site}: boundaries")
     dry = warn_of_suction(flow, slope.porous, slope.body[1], a.site)
     limits = limits_of(a, slope, flow)
     instants, history, stopped = follow(a, slope, flow, folder)

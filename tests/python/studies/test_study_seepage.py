@@ -209,3 +209,44 @@ def test_times_are_in_units_that_can_be_read():
     words = {0.0: "0 days", 4.86: "4.86 s", 60.0: "1 min", 432.0: "7.2 min", 0.01 * DAY: "0.01 days", DAY: "1 day",
              2.5 * DAY: "2.5 days", 1234.4 * DAY: "1234 days"}  # fmt: skip
     assert {time: time_in_words(time) for time in words} == words
+
+
+UPSTREAM = "[boundaries.upstream]\nreservoir = 5.0\n"
+DOWNSTREAM = "[boundaries.downstream]\nreservoir = 3.0\n"
+SEALED = "[boundaries.weir]\nflux = 0.0\n"
+
+
+def weir_in(folder, conditions):
+    """The file of a layer 8 m long and 2 m thick, on which a weir stands from x = 3 m to 5 m, with conditions of the water."""
+    points = [(0, 2), (3, 2), (5, 2), (8, 2), (8, 0), (0, 0)]
+    lines = [f"Point({k}) = {{{x}, {y}, 0}};" for k, (x, y) in enumerate(points, 1)]
+    lines += ["For k In {1:6}", "  Line(k) = {k, k % 6 + 1};", "EndFor", "Curve Loop(1) = {1:6};", "Plane Surface(1) = {1};",
+              'Physical Surface("sand") = {1};', 'Physical Curve("upstream") = {1};', 'Physical Curve("weir") = {2};',
+              'Physical Curve("downstream") = {3};', "Mesh.MeshSizeMax = 0.5;"]  # fmt: skip
+    (folder / "weir.geo").write_text("\n".join(lines) + "\n")
+    (folder / "weir.toml").write_text(f'mesh = "weir.geo"\n[soils.sand]\nconductivity = 1e-5\n{conditions}')
+    return folder / "weir.toml"
+
+
+@pytest.mark.usefixtures("without_pictures")
+@pytest.mark.parametrize(
+    "conditions, said",
+    [
+        (UPSTREAM + DOWNSTREAM + SEALED, []),  # as one writes a weir
+        (
+            UPSTREAM + DOWNSTREAM,
+            ["'upstream' rises to 5 m, above the ground.*flux = 0.0", "'downstream' rises", "no boundary has a"],
+        ),
+        # Without a way out the head is 5 m everywhere, and water presses with (5 - 2) m against what seals the ground.
+        (UPSTREAM + SEALED, [r"boundaries: no boundary has a condition.*y = 2 m.*pressure of 29\.4 kPa.*seepage_face"]),
+    ],
+)
+def test_ground_that_is_sealed_by_mistake_is_said(conditions, said, tmp_path):
+    import seepage
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        site = weir_in(tmp_path, conditions)
+        assert seepage.main(["--site", str(site), "--output", str(tmp_path / "out")]) == 0
+    texts = [str(one.message) for one in caught if one.category is RuntimeWarning]
+    assert len(texts) == len(said) and all(re.search(words, text) for words, text in zip(said, texts)), texts

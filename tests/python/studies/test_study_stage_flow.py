@@ -162,12 +162,12 @@ def test_ground_below_an_impervious_slab_is_not_open():
     slab = mpm.beam([(0.0, 2.0), (4.0, 2.0)], 1e9, 1e7, impervious=True)
     with warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
-        warn_of_sealed_ground(flow, body, [slab], "here")
+        warn_of_sealed_ground(flow, body, [np.array(slab.points)], "here")
     half = mpm.beam([(0.0, 2.0), (2.0, 2.0)], 1e9, 1e7, impervious=True)
     with pytest.warns(
         RuntimeWarning, match=r"here: .* at x = [23]\.5 m, y = 2 m, where the water has a pressure of 29\.4 kPa"
     ):
-        warn_of_sealed_ground(flow, body, [half], "here")
+        warn_of_sealed_ground(flow, body, [np.array(half.points)], "here")
 
 
 def test_the_study_seepage_flows_around_walls(tmp_path):
