@@ -89,6 +89,22 @@ def warn_of_low_reservoirs(domain: Any, facets: Any, boundary: Iterable[Any], wh
                     "above: it is a seepage face, from which the water table does not fall any farther")  # fmt: skip
 
 
+def warn_of_rigid_soil(soils: Mapping[str, water.PorousSoil], boundary: Iterable[Any], path: Any) -> None:
+    """Warn of soil without a compressibility below a reservoir whose level changes: its pore water neither bears water that comes nor keeps its pressure.
+
+    Args:
+        soils: of the flow, by name.
+        boundary: conditions of the water.
+        path: of the file.
+    """
+    changes = any(isinstance(one, water.Reservoir) and len(set(levels_of(one))) > 1 for one in boundary)
+    rigid = [repr(name) for name, soil in soils.items() if soil.compressibility == 0]
+    if changes and rigid:
+        say(f"{path}: the level of a reservoir changes, but {' and '.join(rigid)} {'has' if len(rigid) == 1 else 'have'} no compressibility: pore "
+            "pressures follow the level at once, as in rigid soil, and factors of safety during a drawdown are too high. Give compressibility [1/Pa], "
+            "the inverse of the oedometric modulus, of an elastic law (1 + nu) (1 - 2 nu) / (E (1 - nu))")  # fmt: skip
+
+
 def _middles(domain: Any, facets: np.ndarray) -> np.ndarray:
     """Middles (k, 2) [m] of those of some facets at the border that soil is below of."""
     middles: np.ndarray = upward_facets(domain, facets).mean(axis=1)

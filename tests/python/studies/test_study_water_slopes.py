@@ -3,6 +3,7 @@
 import importlib
 import json
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -206,3 +207,31 @@ def test_pic_hardly_brakes_the_slide(tmp_path):
         options = f"--cell-size 1.6 --days 3 --slide --slide-from lowest --time 3 --frames 2 --no-pictures {pic}"
         moved.append(run("drawdown", path, folder, options)[0]["largest_displacement_m"])
     assert moved[1] > 1 and moved[0] == pytest.approx(moved[1], rel=0.1)
+
+
+def doubts(path):
+    """What reading the site of a slope warns of."""
+    from common.slope_site import read_slope_site
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        read_slope_site(path, MPI.COMM_WORLD, 3.0)
+    return [str(one.message) for one in caught if one.category is RuntimeWarning]
+
+
+@pytest.mark.parametrize(
+    "changes, words",
+    [
+        ((), ""),
+        (
+            (("compressibility = 5e-8  # 1/Pa\n", ""), ("compressibility = 2e-8\n", "")),
+            "'bank' and 'ground' have no compr",
+        ),
+        ((("compressibility = 2e-8\n", ""),), "'ground' has no compressibility"),
+        ((("compressibility = 2e-8\n", ""), ("[[0.0, 7.0], [3.0, 1.0]]", "7.0")), ""),  # all stays as it is
+    ],
+)
+def test_soil_without_a_compressibility_in_a_drawdown_is_said(changes, words, tmp_path):
+    """Its pores would not bear the water that comes and goes: m_v / (m_v + n / K_w) of it is 0 for m_v = 0."""
+    said = [text for text in doubts(site("drawdown", tmp_path, *changes)) if "compressibility" in text]
+    assert len(said) == bool(words) and all(words in text for text in said), said
