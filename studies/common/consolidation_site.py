@@ -33,6 +33,7 @@ import mpm_core as mpm
 from fenics_bridge import water
 from fenics_bridge.fem.active_cells import cells_there
 from fenics_bridge.fem.evaluate import PointSearch
+from fenics_bridge.fem.loads import warn_of_weight
 from fenics_bridge.mesh.names import known_tags, tag_numbers
 from fenics_bridge.water.boundary import value_at
 
@@ -295,6 +296,10 @@ def read_consolidation_site(
     conditions = {id(one): one for stage in stages for one in stage.boundary.values()}  # each once
     warn_of_reservoirs(mesh[0], conditions.values(), path)
     given = {name: pressure_table(one, f"{path}: pressures.{name}") for name, one in table.get("pressures", {}).items()}
+    placed = {soil: weight for soil, weight in site.unit_weight.items() if soil in stages[0].off}
+    warn_of_weight(
+        comm, bridge.Load(unit_weight=placed)
+    )  # of soil that is there from the beginning its equilibrium does
     points = {name: _point(given, f"{path}: points.{name}") for name, given in table["points"].items()}
     search = PointSearch(mesh[0], np.array(list(points.values())).reshape(-1, 2))
     for name, found in zip(points, search.found):

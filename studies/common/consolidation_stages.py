@@ -11,6 +11,7 @@ import numpy as np
 
 import mpm_core as mpm
 
+from .checks import low_pressure, say
 from .site_flow import boundaries_of_stage
 from .site_keys import DAY, require_push
 
@@ -55,6 +56,7 @@ def pressure_table(given: Any, where: str) -> Table:
     if not np.all(np.isfinite(table)):
         raise mpm.InputError(f"{where} is {given!r}, expected finite numbers")
     require_push(float(table[:, 1].min()), where)
+    say(low_pressure(where, float(table[:, 1].max())))
     late = np.flatnonzero(np.diff(table[:, 0]) <= 0)
     if len(late):
         first, second = table[late[0] : late[0] + 2, 0]

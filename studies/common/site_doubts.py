@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from dolfinx.mesh import exterior_facet_indices
-from mpm_core.input_warnings import fast_flow
+from mpm_core.input_warnings import HEAVIEST_RAIN, fast_flow
 
 import fenics_bridge as bridge
 from fenics_bridge import water
@@ -16,13 +16,16 @@ from fenics_bridge.compat import cell_dofs, cell_nodes, facet_nodes
 from fenics_bridge.fem.supports import tagged_facets
 
 from .checks import say
-from .site_keys import STAGE_WATER, changes_of
+from .site_keys import DAY, STAGE_WATER, changes_of
 
 DEEPEST = 3.0
 """Depth of water over the top of a mesh, over the height of the mesh, above which a level is probably a mistake"""
 
 DRIEST = 0.1
 """Suction [m] over the height of a mesh above which soil that remains saturated is probably a mistake"""
+
+LEAST_RAIN = 1e-3
+"""Rain [mm/day] below which it is probably in m/s: 1 m a day is 1.2e-5 m/s"""
 
 LOOSEST = 1e-5
 """Compressibility [1/Pa] above which it is probably in other units, or a modulus"""
@@ -125,8 +128,9 @@ def warn_of_suction(flow: water.Seepage, soils: Mapping[str, water.PorousSoil], 
         found[name] = -min(comm.allgather(float(here))) if isinstance(soil.retention, water.AlwaysSaturated) else 0.0
     dry = [name for name, suction in found.items() if suction > DRIEST * (high - low)]
     if dry:
-        say(f"{path}: {' and '.join(map(repr, dry))} is up to {max(map(found.get, dry)):.3g} m above the water table and has no retention "
-            "curve: it remains saturated there, conducts as much water as below and releases none when the water falls. Give it "
+        verbs = ("is", "has") if len(dry) == 1 else ("are", "have")
+        say(f"{path}: {' and '.join(map(repr, dry))} {verbs[0]} up to {max(map(found.get, dry)):.3g} m above the water table and {verbs[1]} no retention "
+            "curve: such soil remains saturated there, conducts as much water as below and releases none when the water falls. Give it "
             "free_surface = {} or van_genuchten = {...} (docs/water.md), unless capillarity keeps it saturated")  # fmt: skip
     return bool(dry)
 
@@ -138,6 +142,22 @@ def warn_of_flow(soil: water.PorousSoil, where: str) -> None:
     if soil.compressibility > LOOSEST:
         say(f"{where}: compressibility is {soil.compressibility:g} 1/Pa, of an oedometric modulus of {1 / soil.compressibility:.3g} Pa, which "
             "hardly any soil has: compressibilities are in 1/Pa, such as 1e-7 for a modulus of 10 MPa")  # fmt: skip
+
+
+def warn_of_rate(key: str, largest: float, where: str) -> None:
+    """Warn of a rate at a boundary that is probably in other units.
+
+    Args:
+        key: of the boundary, with the unit of the file: rain [mm/day] or flux [m/s].
+        largest: its largest value in that unit.
+        where: it stands in the file.
+    """
+    if key == "rain" and 0 < largest < LEAST_RAIN:
+        say(f"{where}: rain is {largest:g} mm/day at most, next to nothing: rain is in mm/day, and {largest:g} m/s are "
+            f"{largest * 1e3 * DAY:.3g} mm/day")  # fmt: skip
+    if key == "flux" and largest > HEAVIEST_RAIN:
+        say(f"{where}: flux is {largest:g} m/s, more than has ever fallen as rain: a flux is in m/s, and {largest:g} mm/day are "
+            f"{largest * 1e-3 / DAY:.3g} m/s")  # fmt: skip
 
 
 def warn_of_water(table: dict[str, Any], path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import mpm_core as mpm
 from fenics_bridge import water
 
-from .site_doubts import warn_of_flow
+from .site_doubts import warn_of_flow, warn_of_rate
 from .site_keys import CONDITIONS, CURVES, DAY, FLOW, UNDRAINED, part_of
 
 
@@ -93,10 +93,12 @@ def condition(name: str, given: dict, where: str) -> Any:
                     f"{where}: {key} has day {later:g} after day {day:g}, expected rows of rising days"
                 )
         _require_rain(where, key, [number for _, number in value])
+        warn_of_rate(key, max(number for _, number in value), where)
         return make(name, tuple((DAY * float(day), unit * float(number)) for day, number in value))
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise mpm.InputError(f"{where}: {key} is {value!r}, expected a number or rows [days, value]")
     _require_rain(where, key, [value])
+    warn_of_rate(key, value, where)
     return make(name, unit * float(value))
 
 

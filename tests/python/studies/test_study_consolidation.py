@@ -60,6 +60,7 @@ def test_a_wrong_site_is_named(old, new, words, tmp_path):
         ("[boundaries.footing]\nreservoir = 0.5", "[boundaries.footing]\nreservoir = [[0.0, 0.5], [1.0, 100.0]]",
          "the reservoir of 'footing' is 100 m, 100 m above the top of the mesh, which is 6 m high"),
         ("[boundaries.footing]\nreservoir = 0.5", "[boundaries.footing]\nreservoir = 18.0", ""),  # deep water
+        ("[10.0, 20e3]", "[10.0, 20.0]", "pressures.footing is 20 Pa, less than under 0.1 m of soil: 20 kPa are 20e3"),
     ],
 )  # fmt: skip
 def test_values_that_are_probably_mistakes_are_said(old, new, words, tmp_path):
@@ -293,6 +294,20 @@ def test_layers_that_are_placed_in_stages_settle_the_clay_below_as_their_weights
     for found in both:
         assert np.abs(found[days < 0.1 * DAYS]).max() < 1e-9 * expected.max()
         assert np.abs(found - expected).max() < 0.01 * expected.max()
+
+
+@pytest.mark.parametrize("weight, said", [("20e3", False), ("20.0", True)])
+def test_a_unit_weight_of_soil_that_is_placed_later_is_looked_at_too(weight, said, tmp_path):
+    from common.consolidation_site import read_consolidation_site
+
+    _write_layer(tmp_path, (2.0, 2.2))
+    fill = f"[soils.first]\nunit_weight = {weight}\nmaterial = 'elastic'\nyoung = 4e6\npoisson = 0.25\n"
+    (tmp_path / "layer.toml").write_text(CLAY + fill + "[[stages]]\nday = 1.0\nfill = 'first'\n")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        read_consolidation_site(tmp_path / "layer.toml", MPI.COMM_SELF)
+    texts = [str(one.message) for one in caught if one.category is RuntimeWarning]
+    assert ["unit weight of 'first' is 20 N/m3" in text for text in texts] == [True] * said, texts
 
 
 @pytest.mark.parametrize(

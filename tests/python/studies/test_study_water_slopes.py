@@ -2,6 +2,7 @@
 
 import importlib
 import json
+import re
 import sys
 import warnings
 from pathlib import Path
@@ -235,3 +236,23 @@ def test_soil_without_a_compressibility_in_a_drawdown_is_said(changes, words, tm
     """Its pores would not bear the water that comes and goes: m_v / (m_v + n / K_w) of it is 0 for m_v = 0."""
     said = [text for text in doubts(site("drawdown", tmp_path, *changes)) if "compressibility" in text]
     assert len(said) == bool(words) and all(words in text for text in said), said
+
+
+@pytest.mark.parametrize(
+    "given, words",
+    [
+        (
+            "rain = [[0.0, 0.0], [2.0, 5.8e-7]]",
+            "boundaries.crest: rain is 5.8e-07 mm/day at most.*5.8e-07 m/s are 50.1 mm/day",
+        ),
+        ("rain = 0.0", ""),
+        ("flux = [[0.0, 0.0], [2.0, 50.0]]", "boundaries.crest: flux is 50 m/s.*50 mm/day are 5.79e-07 m/s"),
+        ("flux = 1e-6", ""),
+        ("flux = -2e-6", ""),  # water that a drain takes
+    ],
+)
+def test_rain_in_metres_a_second_and_a_flux_in_millimetres_a_day_are_said(given, words, tmp_path):
+    """1 m/s is 8.64e7 mm/day."""
+    text = "[boundaries.crest]\nrain = [[0.0, 0.5], [2.0, 100.0], [10.0, 100.0], [12.0, 0.5]]\n"
+    said = doubts(site("rain", tmp_path, (text, f"[boundaries.crest]\n{given}\n")))
+    assert len(said) == bool(words) and all(re.search(words, text) for text in said), said
