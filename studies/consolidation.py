@@ -33,6 +33,7 @@ from common.discharge import extent_of
 from common.field_files import FieldFiles
 from common.field_plots import Field, gathered
 from common.figures import Pictures
+from common.flow_doubts import warn_of_later_changes
 from common.member_results import captions
 from common.movie import PORE, particle_movie
 from common.options import add_count, add_flag, add_number, add_switch, study_parser
@@ -311,6 +312,8 @@ def main(arguments: list[str] | None = None) -> int:
     a: Namespace = parser().parse_args(arguments)
     start = perf_counter()
     site = read_consolidation_site(a.site, comm, a.cell_size, pressures_of(a.pressures or []))
+    starts = {stage.name: stage.start for stage in site.stages[1:]}
+    warn_of_later_changes(a.days, site.stages[-1].boundary.values(), a.site, site.pressures, starts)
     say("" if site.changes_until(DAY * a.days) else
         f"nothing changes within {a.days:g} days, so that the ground stays in its first equilibrium, which includes pressures that are numbers: "
         "a load that consolidates the ground begins at 0, such as 'top = [[0.0, 0.0], [0.01, 30e3]]' in the file, rows of [days, Pa], "

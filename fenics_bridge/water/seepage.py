@@ -42,7 +42,7 @@ from fenics_bridge.water.soils import (
     set_by_soil,
     soils_by_tag,
 )
-from mpm_core import Geometry
+from mpm_core import Geometry, RunError
 
 QUADRATURE = {1: 3, 2: 5}
 """Degree of the quadrature by the degree of the elements; permeabilities that vary within a cell have no exact one."""
@@ -159,7 +159,7 @@ class Seepage:
 
         Raises:
             InputError: no boundary condition determines the pressure, or one is not possible. Raised on all ranks alike.
-            RuntimeError: no steady flow was found.
+            RunError: no steady flow was found.
         """
         self._take_boundary()
         self._applied.require_values(self.time)
@@ -174,8 +174,8 @@ class Seepage:
         if failure:
             failure = self._sharpen()
         if failure:
-            raise RuntimeError(f"steady seepage was not found: {failure}; try a retention curve that falls more gently, or a "
-                               "finer mesh")  # fmt: skip
+            raise RunError(f"steady seepage was not found: {failure}; try a retention curve that falls more gently, or a "
+                           "finer mesh, or less water that a Flux brings into the soil")  # fmt: skip
 
     def _sharpen(self) -> Any:
         """Find the steady flow by continuation.

@@ -15,6 +15,7 @@ from fenics_bridge.mesh.walls import distance_from
 
 from .checks import say
 from .site_doubts import ends_of_height, levels_of, upward_facets
+from .site_keys import DAY
 
 SEALED = 0.01
 """Pressure head [m] at ground without a condition, over the height of the mesh, above which it is said"""
@@ -87,6 +88,36 @@ def warn_of_low_reservoirs(domain: Any, facets: Any, boundary: Iterable[Any], wh
             if level < lowest:
                 say(f"{where}: steady_flow: the reservoir of {one.facet_tag!r} is at {level:g} m, below this boundary, which is at {lowest:g} m and "
                     "above: it is a seepage face, from which the water table does not fall any farther")  # fmt: skip
+
+
+def warn_of_later_changes(
+    days: float,
+    boundary: Iterable[Any],
+    path: Any,
+    pressures: Mapping[str, Any] | None = None,
+    starts: Mapping[str, float] | None = None,
+) -> None:
+    """Warn of what the file of a site describes for days after the end of a run.
+
+    Args:
+        days: duration of the run, the option --days.
+        boundary: conditions of the water.
+        path: of the file.
+        pressures: tables of (s, Pa), by boundary.
+        starts: times at which stages begin [s], by their names.
+    """
+    tables = {f"boundaries.{one.facet_tag}": getattr(one, key, None) for one in boundary for key in ("level", "rate")
+              if isinstance(getattr(one, key, None), tuple)}  # fmt: skip
+    tables |= {f"pressures.{name}": table for name, table in (pressures or {}).items()}
+    end = DAY * days
+    last = {
+        name: max((b[0] for a, b in zip(table, table[1:]) if b[1] != a[1]), default=0.0)
+        for name, table in tables.items()
+    }
+    said = [f"{name} (changes until day {time / DAY:.4g})" for name, time in last.items() if time > end]
+    said += [f"stage {name!r} (day {time / DAY:.4g})" for name, time in (starts or {}).items() if time >= end]
+    if said:
+        say(f"{path}: the run ends after {days:g} days (--days), and leaves out what comes later: {', '.join(said)}")
 
 
 def warn_of_rigid_soil(soils: Mapping[str, water.PorousSoil], boundary: Iterable[Any], path: Any) -> None:

@@ -17,7 +17,7 @@ from fenics_bridge import water
 
 from .checks import say
 from .collapse_runs import UNDECIDED
-from .flow_doubts import warn_of_sealed_ground
+from .flow_doubts import warn_of_later_changes, warn_of_sealed_ground
 from .lengths import metres
 from .page import Page
 from .quiet import NOT_REACHED, without_warning
@@ -55,6 +55,7 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
     """
     start = perf_counter()
     slope = read_slope_site(a.site, comm, a.cell_size, a.slower)
+    warn_of_later_changes(a.days, slope.boundary, a.site)
     if a.davis and any(field.parameter == "friction_angle" for field in slope.site.random):
         raise mpm.InputError(f"{a.site}: friction_angle is a random field, expected --no-davis with it: the strength of Davis needs the same "
                              "angles in all of a soil")  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from mpm_core import InputError
+from mpm_core import InputError, RunError
 
 STUDIES = Path(__file__).parents[3] / "studies"
 sys.path.insert(0, str(STUDIES))
@@ -250,3 +250,39 @@ def test_ground_that_is_sealed_by_mistake_is_said(conditions, said, tmp_path):
         assert seepage.main(["--site", str(site), "--output", str(tmp_path / "out")]) == 0
     texts = [str(one.message) for one in caught if one.category is RuntimeWarning]
     assert len(texts) == len(said) and all(re.search(words, text) for words, text in zip(said, texts)), texts
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_a_steady_flow_that_is_not_found_ends_the_study_with_its_message(tmp_path, monkeypatch):
+    """`run_study` shows the message alone of a RunError."""
+    import seepage
+    from fenics_bridge import water
+
+    monkeypatch.setattr(water.Seepage, "_solve", lambda *_: "it diverges")
+    monkeypatch.setattr(water.Seepage, "_sharpen", lambda *_: "it diverges")
+    site = weir_in(tmp_path, UPSTREAM + DOWNSTREAM + SEALED)
+    with pytest.raises(RunError, match="steady seepage was not found: it diverges"):
+        seepage.main(["--site", str(site), "--output", str(tmp_path / "out")])
+
+
+ROWS = ((0.0, 5.0), (10 * 86400.0, 3.0), (20 * 86400.0, 3.0))
+
+
+@pytest.mark.parametrize(
+    "days, starts, said",
+    [
+        (30.0, {"fill": 86400.0 * 29}, ""),
+        (15.0, {}, ""),  # the level stays from day 10 on
+        (9.0, {}, r"after 9 days .*boundaries.face \(changes until day 10\)$"),  # 3.2 m on day 9
+        (15.0, {"fill": 86400.0 * 15}, r"after 15 days .*stage 'fill' \(day 15\)$"),
+    ],
+)
+def test_what_a_site_describes_for_days_after_the_end_is_said(days, starts, said):
+    from common.flow_doubts import warn_of_later_changes
+    from fenics_bridge import water
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        boundary = [water.Reservoir("face", ROWS), water.Head("far", 4.0)]
+        warn_of_later_changes(days, boundary, "site.toml", {"top": ((0.0, 0.0), (86400.0, 2e4))}, starts)
+    assert [bool(re.search(said, str(one.message))) for one in caught] == [True] * bool(said)
