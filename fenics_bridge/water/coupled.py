@@ -47,8 +47,8 @@ class Element(Enum):
 
 
 UNSATURATED, LUMPED = {"quadrature_degree": 4}, {"quadrature_rule": "vertex", "quadrature_degree": 1}
-"""Integrals of soil that may dry: flow and forces; water that it stores, at the vertices, so that pressures do not oscillate. What
-the hoop strain u / r presses out is of the first kind: on the axis it has no value of its own."""
+"""Integrals of soil that may dry: forces; flow, and water that it stores, at the vertices, so that fronts enter dry cells and pressures do
+not oscillate. What the hoop strain u / r presses out is of the first kind: on the axis it has no value of its own."""
 
 
 def _may_dry(soil: PorousSoil) -> bool:
@@ -164,11 +164,14 @@ class WaterTerms:
         return self._unit.value * assembled(fem.form(self._flow(self._up, q, 0.0)), space).array
 
     def _flow(self, gradient: Any, q: Any, pressure: Any) -> Any:
-        def density(soil: PorousSoil) -> Any:
-            through = soil.retention.relative_permeability(-self._unit * pressure) if _may_dry(soil) else 1.0
-            return through * ufl.inner(soil.conductivity * gradient, ufl.grad(q))
-
-        return self._sum(density)
+        total = 0
+        for soil, dx in zip(self._soils, self._measures):
+            density = weighted(self._there * ufl.inner(soil.conductivity * gradient, ufl.grad(q)), self._radius)
+            if _may_dry(soil):
+                total += soil.retention.relative_permeability(-self._unit * pressure) * density * dx(metadata=LUMPED)
+            else:
+                total += density * dx
+        return total
 
     def _sum(self, density: Callable[[PorousSoil], Any]) -> Any:
         """Integral over the cells of all soils of a density that is a function of the soil."""

@@ -44,8 +44,13 @@ from fenics_bridge.water.soils import (
 )
 from mpm_core import Geometry, RunError
 
-QUADRATURE = {1: 3, 2: 5}
-"""Degree of the quadrature by the degree of the elements; permeabilities that vary within a cell have no exact one."""
+RULES = {1: {"quadrature_rule": "vertex", "quadrature_degree": 1}, 2: {"quadrature_degree": 5}}
+"""Quadrature by the degree of the elements; permeabilities that vary within a cell have no exact one.
+
+Linear elements integrate at the vertices, so that the permeability of a cell is the mean of those of its nodes, as usual in finite differences
+(Celia, Bouloutas and Zarba 1990). Between a wet node and a dry one the suction is linear, so that a sharp curve would leave the cell as good as
+impervious: rain that ponds on dry sand would wet half of a cell and no more.
+"""
 
 MOST_CONTINUATION_STEPS = 60
 """Steps of the continuation to a steady flow."""
@@ -249,7 +254,7 @@ class Seepage:
         for soil, dx in zip(self._of_forms, self._measures):
             k = soil.conductivity / largest
             permeability = soil.retention.relative_permeability(-self._sharpness * self.unit_weight * psi)
-            flow = dx(metadata={"quadrature_degree": QUADRATURE[self._degree]})
+            flow = dx(metadata=RULES[self._degree])
             permeability = weighted(permeability, self._radius)
             form += permeability * ufl.inner(k * (ufl.grad(psi) + self._up), ufl.grad(test)) * flow
             lagged += permeability * ufl.inner(k * ufl.grad(trial), ufl.grad(test)) * flow
@@ -263,10 +268,8 @@ class Seepage:
 
     def _lumped(self, density: Any, dx: Any) -> Any:
         """The integral of what is lumped: linear elements integrate it at their vertices."""
-        if self._degree == 1:
-            rule = {"quadrature_rule": "vertex", "quadrature_degree": 1}
-            return weighted(density, self._lumped_radius) * dx(metadata=rule)
-        return weighted(density, self._radius) * dx(metadata={"quadrature_degree": QUADRATURE[self._degree]})
+        radius = self._lumped_radius if self._degree == 1 else self._radius
+        return weighted(density, radius) * dx(metadata=RULES[self._degree])
 
     def _water_content(self, soil: PorousSoil, psi: Any, load: Any) -> Any:
         return soil.retention.saturation(-self.unit_weight * psi) * (soil.porosity + self._held(soil, psi, load))
@@ -322,6 +325,11 @@ class Seepage:
         for soil, own in zip(self._soils, self._cells):
             there = compat.expression_values(head, self.domain, own).reshape(len(own), len(places), 1 + dim)
             permeability = soil.retention.relative_permeability(-self.unit_weight * there[..., :1])
+            if self._degree == 1:  # as in the flow itself
+                corners = psi.x.array[compat.cell_dofs(psi.function_space)[own]]
+                permeability = soil.retention.relative_permeability(-self.unit_weight * corners).mean(axis=1)[
+                    :, None, None
+                ]
             velocities[dofs[own]] = -permeability * (there[..., 1:] @ soil.tensor(soil.conductivity, dim).T)
         return result
 

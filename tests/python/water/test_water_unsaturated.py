@@ -110,6 +110,49 @@ def test_rain_seeps_to_the_water_table_as_gardner_has_it(element):
     np.testing.assert_allclose(alpha * psi, np.log(part + (1 - part) * np.exp(-alpha * z)), atol=2e-3)
 
 
+SAND = water.VanGenuchten(alpha=14.5 / GRAVITY_OF_WATER, n=2.68, residual=0.1)
+"""Retention of sand (Carsel and Parrish 1988)"""
+
+
+def green_and_ampt(curve, dry, time):
+    """Water [m] that enters soil under ponded water in a time [s]: t k / d = z - f ln(1 + z / f), of which d z has entered (Green and Ampt 1911).
+
+    The head f [m] that draws the front is the integral of k_r over the suction (Neuman 1976); d is what the pores lack at the suction of the dry
+    soil [Pa].
+    """
+    suction = np.linspace(0.0, 5e4, 50001)
+    relative = curve.relative_permeability(suction)
+    front = np.sum(0.5 * (relative[1:] + relative[:-1]) * np.diff(suction)) / GRAVITY_OF_WATER
+    lacking = POROSITY * (1 - curve.saturation(dry))
+    depth = np.linspace(0.0, 2.0, 200001)
+    return lacking * np.interp(time * CONDUCTIVITY / lacking, depth - front * np.log1p(depth / front), depth)
+
+
+@pytest.mark.parametrize("flow", ["seepage", *water.Element])
+@pytest.mark.parametrize("n", [10, 20])
+def test_rain_that_ponds_enters_dry_sand(flow, n):
+    """No less enters than by gravity alone, k t, as long as the front is in the sand, and about what Green and Ampt have, whose front is sharp."""
+    boundary, end = [
+        water.Head(BASE, -3.0),
+        water.Rain(TOP, 10 * CONDUCTIVITY),
+    ], 1e4  # a water table 3 m below the base
+    model = column(water.Element.STABILISED if flow == "seepage" else flow, 1e14, SAND, boundary, n=n)
+    if flow == "seepage":
+        porous = water.PorousSoil(CONDUCTIVITY, porosity=POROSITY, retention=SAND)
+        model = water.Seepage(model.domain, porous, model._facet_tags, boundary)
+        model.pressure_head.interpolate(lambda x: -3.0 - x[1])
+    else:
+        model.initialise(np.zeros((len(model.points.coordinates()), 4)), lambda x: -GRAVITY_OF_WATER * (3.0 + x[:, -1]))
+    before, dt = model.stored_water(), 125.0
+    while model.time < end - 1e-6:
+        report = model.advance(min(dt, end - model.time))
+        dt *= 1.0 if (report if flow == "seepage" else report.converged) else 0.5
+        assert dt > 1.0
+    entered = (model.stored_water() - before) / 0.2  # over the width of the column
+    assert entered > CONDUCTIVITY * end
+    assert entered == pytest.approx(green_and_ampt(SAND, 3.5 * GRAVITY_OF_WATER, end), rel=0.15)
+
+
 @ELEMENTS
 def test_a_cylinder_that_is_squeezed_without_a_flow_keeps_its_water(element):
     """Under a suction of its water, whose saturation is S, it is stretched along the radius by u = e r: its volume grows by 2 e,
