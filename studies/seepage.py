@@ -12,7 +12,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from common.discharge import extent_of, in_words, inflow_column, inflows
+from common.discharge import exit_gradients, extent_of, in_words, inflow_column, inflows
 from common.field_files import FieldFiles
 from common.field_plots import save_curves
 from common.figures import Pictures
@@ -162,9 +162,10 @@ def main(arguments: list[str] | None = None) -> int:
     names = [c.facet_tag for c in site.boundary]
     flow.solve()
     warn_of_sealed_ground(flow, site.ground, site.walls, f"{a.site}: boundaries")
-    extent, steady = extent_of(flow), inflows(flow, names)
+    extent, steady, gradients = extent_of(flow), inflows(flow, names), exit_gradients(flow)
     dry = warn_of_suction(flow, site.soils, site.cell_tags, a.site)
-    pictures, stopped = [flow_picture(flow, "Steady flow at the beginning", members=site.walls)], None
+    title = "Steady flow at the beginning" if site.varies else "Steady flow"
+    pictures, stopped = [flow_picture(flow, title, members=site.walls)], None
     film = pictures[:1]
     with Files(flow, names, folder) as files:
         files.row()
@@ -175,12 +176,16 @@ def main(arguments: list[str] | None = None) -> int:
                 warn_of_suction(flow, site.soils, site.cell_tags, a.site)
     summary = {
         "finished_run": stopped is None, "stopped_because": stopped,
-        **{f"steady_{name}": value for name, value in steady.items()},
+        **{f"steady_{name}": value for name, value in (steady | gradients).items()},
         "last_time_days": flow.time / DAY, f"stored_water_{extent.unit}": extent.factor * flow.stored_water(),
         "steps": len(files.history) - 1, "wall_seconds": perf_counter() - start,
     }  # fmt: skip
     said = zip(names, in_words(steady, extent).values())
     lines = [f"steady inflow, {name}: {value}" for name, value in dict(said).items()]
+    largest, upward = gradients.values()
+    lines += [
+        f"largest gradient of the steady flow where water leaves: {largest:.3g}, its upward part {upward + 0.0:.3g} (about 1 lifts sand)"
+    ]
     page = Page(captions=CAPTIONS | {"inflow": CAPTIONS["inflow"].format(extent.words)})
     return write_summary(
         folder, a, summary, comm, page, drawn(site, flow, files, pictures, film, folder), said="\n".join(lines)

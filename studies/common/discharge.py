@@ -9,6 +9,7 @@ import numpy as np
 
 import mpm_core as mpm
 from fenics_bridge import water
+from fenics_bridge.water.boundary import value_at
 
 from .site_keys import DAY
 
@@ -44,6 +45,19 @@ def inflows(flow: water.Seepage, names: Iterable[str]) -> dict[str, float]:
     """What enters at boundaries [m2/day], or all around the axis [m3/day], by the names of columns. Collective."""
     extent = extent_of(flow)
     return {inflow_column(name, extent): DAY * extent.factor * flow.inflow(name) for name in names}
+
+
+def exit_gradients(flow: water.Seepage) -> dict[str, float]:
+    """Largest gradient [-] with which water leaves, and its largest upward component, which lifts soil. Collective.
+
+    Boundaries at which a flux lets no water leave do not count: at the tip of a sheet pile the gradient beside the ground is singular.
+    """
+    lets_out = [
+        one for one in flow.boundary if not (isinstance(one, water.Flux) and value_at(one.rate, flow.time) >= 0)
+    ]
+    tags = list(dict.fromkeys(one.facet_tag for one in lets_out))
+    return {key: max((water.exit_gradient(flow, tag, upward) for tag in tags), default=0.0)
+            for key, upward in (("largest_exit_gradient", False), ("largest_upward_exit_gradient", True))}  # fmt: skip
 
 
 def in_words(found: Mapping[str, float], extent: Extent) -> dict[str, str]:

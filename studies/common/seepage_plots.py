@@ -32,6 +32,8 @@ PRESSURE = Quantity("Pore pressure", "kPa", scale=1e-3, colours="BrBG")
 SATURATION = Quantity("Degree of saturation", "-", colours="viridis")
 LIGHT, DARK = ("white", "#404040"), ("#303030", "white")
 """Flow lines on dark and on light colours: their own, and that around them"""
+ROUND_OFF = 1e-6
+"""Part of a scale by which a value may lie outside of it without an arrow at the colour bar"""
 MODERATE = 50.0
 """Suction [kPa] that a scale of pore pressures shows, where there is so much"""
 
@@ -197,7 +199,7 @@ def _figure(pictures: Sequence[FlowPicture], quantity: Quantity, scales: tuple[n
     if table:
         water_legend(panels[0, 0], below=aspect > 1)
     bar = figure.colorbar(ScalarMappable(norm, colours), ax=panels.ravel().tolist(), shrink=0.7, pad=0.01,
-                          extend="min" if least < limits[0] else "neither")  # fmt: skip
+                          extend="min" if least < limits[0] - ROUND_OFF * (limits[1] - limits[0]) else "neither")  # fmt: skip
     bar.set_label(quantity.label)
     return figure
 
@@ -216,10 +218,11 @@ def _flow_lines(axes: Axes, picture: FlowPicture, box: tuple, fastest: float, lo
     grid = np.meshgrid(x, y)
     u, v, p = (LinearTriInterpolator(triangles, values)(*grid)
                for values in (*picture.velocity[first].T, picture.head.values[first, 0]))  # fmt: skip
+    flat = (high[1] - low[1]) / (high[0] - low[0])  # lines of a flat section would lie on one another
     speed = np.hypot(u, v)
     if not speed.max() > 1e-6 * fastest:
         return
     still = speed.mask | (speed.filled(0) < 1e-4 * speed.max()) | (p.filled(-1) < 0)
     drawn = axes.streamplot(x, y, np.ma.array(u, mask=still), np.ma.array(v, mask=still), color=look[0], linewidth=0.6,
-                            density=0.9, arrowsize=0.6)  # fmt: skip
+                            density=(0.9, 0.9 * min(1.0, np.sqrt(flat))), arrowsize=0.6)  # fmt: skip
     drawn.lines.set_path_effects([withStroke(linewidth=1.5, foreground=look[1])])  # one colour alone is lost somewhere

@@ -17,7 +17,7 @@ from fenics_bridge import water
 from fenics_bridge.water.soils import WATER_WEIGHT
 
 from .checks import say
-from .discharge import extent_of, in_words, inflows
+from .discharge import exit_gradients, extent_of, in_words, inflows
 from .flow_doubts import warn_of_kept_flow, warn_of_low_reservoirs, warn_of_sealed_ground
 from .site_doubts import warn_of_reservoirs
 from .site_flow import boundaries_of_stage, boundary_of, wet_soils
@@ -49,9 +49,7 @@ def flow_row(pressure: Any) -> dict[str, float]:
         return {}
     flow = pressure.flow
     tags = boundaries_of(flow)
-    gradients = {name: max(water.exit_gradient(flow, tag, upward) for tag in tags)
-                 for name, upward in (("largest_exit_gradient", False), ("largest_upward_exit_gradient", True))}  # fmt: skip
-    return inflows(flow, tags) | gradients
+    return inflows(flow, tags) | exit_gradients(flow)
 
 
 def boundaries_of(flow: water.Seepage) -> list[str]:

@@ -79,6 +79,8 @@ def test_the_flow_of_a_homogeneous_block_is_darcys(tmp_path, capsys):
     darcy = 86400 * 1e-5 * (5.0 - 3.0) / 4.0 * 2.0
     assert summary["steady_inflow_left_m2_per_day"] == pytest.approx(darcy, rel=1e-9)
     assert summary["steady_inflow_right_m2_per_day"] == pytest.approx(-darcy, rel=1e-9)
+    assert summary["steady_largest_exit_gradient"] == pytest.approx((5.0 - 3.0) / 4.0, rel=1e-9)
+    assert abs(summary["steady_largest_upward_exit_gradient"]) < 1e-9
     assert (folder / "seepage_steady.png").stat().st_size > 10_000
     assert f"left: {1000 * darcy:.4g} litres" in capsys.readouterr().out
 
@@ -286,3 +288,31 @@ def test_what_a_site_describes_for_days_after_the_end_is_said(days, starts, said
         boundary = [water.Reservoir("face", ROWS), water.Head("far", 4.0)]
         warn_of_later_changes(days, boundary, "site.toml", {"top": ((0.0, 0.0), (86400.0, 2e4))}, starts)
     assert [bool(re.search(said, str(one.message))) for one in caught] == [True] * bool(said)
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_the_gradient_beside_a_sheet_pile_is_that_of_the_water_that_leaves(tmp_path):
+    """pi H / (4 K T sin(pi s / 2 T)) with K of the modulus cos(pi s / 2 T), 1.8541 for a pile through half of the layer (Harr 1962). At the tip of
+    the pile it is singular, but no water leaves there."""
+    import seepage
+
+    site, folder = STUDIES.parent / "meshes" / "sheet_pile.toml", tmp_path / "out"
+    assert seepage.main(["--site", str(site), "--elements", "P2", "--output", str(folder)]) == 0
+    summary = json.loads((folder / "summary.json").read_text())
+    expected = np.pi * 2.0 / (4 * 1.8541 * 4.0 * np.sin(np.pi / 4))
+    assert summary["steady_largest_exit_gradient"] == pytest.approx(expected, rel=0.04)
+    assert summary["steady_largest_upward_exit_gradient"] == pytest.approx(expected, rel=0.04)
+
+
+@pytest.mark.parametrize("heads, arrow", [((1.0, 6.0), False), ((1.0 - 1e-9, 6.0), False), ((0.7, 6.0), False)])
+def test_round_off_gives_the_colour_bar_of_heads_no_arrow(heads, arrow):
+    """Linear elements have the head of a reservoir to their round-off; all heads are on the scale."""
+    from common.field_plots import Field
+    from common.seepage_plots import HEAD, FlowPicture, _figure, _scales
+
+    points, cells = np.array([(0.0, 0.0), (4.0, 0.0), (4.0, 1.0), (0.0, 1.0)]), np.array([(0, 1, 2), (0, 2, 3)])
+    total = np.array([heads[1], heads[0], heads[0], heads[1]])
+    head = Field(points, cells, (total - points[:, 1])[:, None], [])
+    flow = FlowPicture("flow", head, np.zeros((4, 2)), np.ones(4), 9810.0)
+    figure = _figure([flow], HEAD, _scales([flow], HEAD))
+    assert (figure.axes[-1]._colorbar.extend == "min") == arrow
