@@ -212,9 +212,10 @@ class AppliedBoundary:
         )
 
     def inflow(self, facet_tag: int | str | None, reaction: NDArray[np.float64]) -> float:
-        """Water that enters through the facets of a tag; a node where several conditions meet counts for the first of them.
+        """Water that enters through the facets of a tag. Collective.
 
-        Collective.
+        A node where several conditions meet counts for the one that holds its pressure: a head or reservoir before a seepage face or rain, and
+        the first of them of the same kind. A flux has what it prescribes.
 
         Args:
             facet_tag: number or name of the tag; None for all conditions together.
@@ -231,9 +232,12 @@ class AppliedBoundary:
         numbers = None if facet_tag is None else tag_numbers(comm, self._facet_tags, facet_tag, "facet_tag")
         counted = np.zeros(len(self.height), dtype=bool)
         n, total = self._space.dofmap.index_map.size_local, 0.0
-        for held in self.held:
+        for held in sorted(self.held, key=lambda held: not isinstance(held.condition, (Head, Reservoir))):
             new = held.dofs[~counted[held.dofs] & (held.dofs < n)]
-            counted[held.dofs] = True
+            if isinstance(held.condition, Flux):
+                new = new[:0]
+            else:
+                counted[held.dofs] = True
             if numbers is not None and set(held.tags).isdisjoint(numbers):
                 continue
             total += reaction[new].sum()

@@ -293,7 +293,8 @@ class Seepage:
         """Water that enters through the facets of a tag. Collective.
 
         It follows from the equilibrium of the nodes, so that the inflows of all tags balance to the tolerance of the solution.
-        A node where several conditions meet counts for the first of them.
+        A node where several conditions meet counts for a head or reservoir before a seepage face or rain, otherwise for the first of them; a flux
+        has what it prescribes.
 
         Args:
             facet_tag: number or name of the tag; None for all boundary conditions together.

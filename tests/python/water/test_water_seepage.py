@@ -1,6 +1,7 @@
 """Seepage by finite elements against closed forms: a dam, a sheet pile, infiltration, drainage; its balance of water."""
 
 import math
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 from fenics_bridge import water
+from fenics_bridge.compat import facet_nodes
 from mpm_core import InputError
 
 comm = MPI.COMM_WORLD
@@ -396,3 +398,24 @@ def test_the_saturation_is_that_of_each_soils_curve():
     found = bridge.evaluate_at(points, s=flow.saturation())["s"][:, 0]
     expected = [1.0, *(float(curve.saturation(WEIGHT * height)) for height in (0.5, 1.0)), 1.0]
     np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
+def test_inflows_do_not_depend_on_the_order_of_the_conditions():
+    """Below a weir from x = 3 m to 5 m, at whose ends most of the water enters and leaves; nothing passes through its base."""
+    domain, _, facet_tags = bridge.box_mesh(comm, (8.0, 2.0), (16, 4))
+    domain.topology.create_connectivity(1, 0)
+    facets = mesh.exterior_facet_indices(domain.topology)
+    middles = domain.geometry.x[facet_nodes(domain, facets)].mean(axis=1)
+    values = np.where(middles[:, 1] < 2.0 - 1e-9, 0, 1 + np.searchsorted((3.0, 5.0), middles[:, 0])).astype(np.int32)
+    tags = bridge.name_tags(
+        mesh.meshtags(domain, 1, facets[values > 0], values[values > 0]), dict(up=1, weir=2, down=3)
+    )
+    found = []
+    conditions = [water.Flux("weir", 0.0), water.Reservoir("up", 5.0), water.SeepageFace("down")]
+    for given in permutations(conditions):
+        flow = water.Seepage(domain, water.PorousSoil(1e-5), tags, list(given))
+        flow.solve()
+        found.append([flow.inflow(name) for name in ("up", "weir", "down", None)])
+    assert np.allclose(found, found[0], rtol=1e-9, atol=1e-14)
+    up, weir, down, total = found[0]
+    assert weir == 0.0 and up > 0 and up == pytest.approx(-down, rel=1e-9) and abs(total) < 1e-9 * up
