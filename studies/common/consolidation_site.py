@@ -40,7 +40,7 @@ from fenics_bridge.water.boundary import value_at
 from .checks import say
 from .consolidation_stages import GroundStage, Table, pressure_table, stages_of
 from .flow_doubts import warn_of_sealed_ground
-from .site_doubts import warn_of_reservoirs
+from .site_doubts import warn_of_heads, warn_of_reservoirs
 from .site_file import Site, site_of
 from .site_flow import boundary_of, wet_soils
 from .site_k0 import of_soils
@@ -150,6 +150,7 @@ class ConsolidationSite:
         flow = water.Seepage(body[0], wet, body[2], boundary, cell_tags=body[1], geometry=self.site.geometry)
         flow.solve()
         there = [soil for soil in self.soils if soil not in off]
+        warn_of_heads(body[0], body[2], boundary, "boundaries, at the beginning")
         warn_of_sealed_ground(flow, part_of_mesh(self.mesh, there)[0], (), "boundaries, at the beginning")
         fem = bridge.QuasiStatic(
             domain,

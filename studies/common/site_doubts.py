@@ -24,6 +24,9 @@ DEEPEST = 3.0
 DRIEST = 0.1
 """Suction [m] over the height of a mesh above which soil that remains saturated is probably a mistake"""
 
+FLOODED = 0.01
+"""Head above the ground, over the height of the mesh, above which it is probably that of water that stands there"""
+
 LEAST_RAIN = 1e-3
 """Rain [mm/day] below which it is probably in m/s: 1 m a day is 1.2e-5 m/s"""
 
@@ -53,7 +56,7 @@ def warn_of_reservoirs(domain: Any, boundary: Iterable[Any], path: Any) -> None:
             warn_of_depth(domain, levels_of(condition), f"{path}: the reservoir of {condition.facet_tag!r}")
 
 
-def levels_of(reservoir: water.Reservoir) -> list[float]:
+def levels_of(reservoir: water.Reservoir | water.Head) -> list[float]:
     """Its levels over time [m]."""
     given = np.asarray(reservoir.level, dtype=float)
     levels: list[float] = (given[:, 1] if given.ndim else given[None]).tolist()
@@ -93,6 +96,26 @@ def warn_of_flooded_ground(domain: Any, facet_tags: Any, boundary: Iterable[Any]
             say(f"{path}: the reservoir of {condition.facet_tag!r} rises to {level:g} m, above the ground beside it at x = {x:.4g} m, y = {y:.4g} m, "
                 "which is not part of a reservoir: no water stands on it or enters there; lower the level, or give that boundary a reservoir, or "
                 "flux = 0.0 where a structure seals it")  # fmt: skip
+
+
+def warn_of_heads(domain: Any, facet_tags: Any, boundary: Iterable[Any], path: Any) -> None:
+    """Warn of a head above ground that looks upwards, where soil is computed too: its water does not press on the ground. Collective.
+
+    Args:
+        domain, facet_tags: of a section.
+        boundary: boundary conditions of the water.
+        path: of the file.
+    """
+    low, high = ends_of_height(domain)
+    for condition in boundary:
+        if not isinstance(condition, water.Head):
+            continue
+        ground = upward_facets(domain, tagged_facets(domain.comm, facet_tags, condition.facet_tag, "boundary"))
+        tops = [part for part in domain.comm.allgather(ground[:, :, 1].ravel()) if len(part)]
+        over = max(levels_of(condition)) - float(min(map(np.min, tops), default=np.inf))
+        if over > FLOODED * (high - low):
+            say(f"{path}: the head of {condition.facet_tag!r} is up to {over:.3g} m above this ground, but its water does not press on the ground: "
+                "where water stands there, take reservoir in the place of head")  # fmt: skip
 
 
 def upward_facets(domain: Any, facets: np.ndarray) -> np.ndarray:

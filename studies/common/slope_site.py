@@ -23,7 +23,7 @@ from fenics_bridge.water.soils import WATER_WEIGHT
 
 from .checks import say
 from .flow_doubts import warn_of_rigid_soil
-from .site_doubts import warn_of_flooded_ground, warn_of_members, warn_of_pressures, warn_of_reservoirs
+from .site_doubts import warn_of_flooded_ground, warn_of_heads, warn_of_members, warn_of_pressures, warn_of_reservoirs
 from .site_file import Site, site_of
 from .site_flow import boundary_of, wet_soils
 from .site_k0 import k0_of, overconsolidation_of, say_left_out
@@ -140,6 +140,7 @@ def read_slope_site(path: Path, comm: MPI.Comm, cell_size: float | None = None, 
     body = site.body()
     warn_of_reservoirs(body[0], boundary, path)
     warn_of_flooded_ground(body[0], body[2], boundary, path)
+    warn_of_heads(body[0], body[2], boundary, path)
     warn_of_rigid_soil(porous, boundary, path)
     return SlopeSite(site, porous, boundary, body)
 

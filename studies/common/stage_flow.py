@@ -19,7 +19,7 @@ from fenics_bridge.water.soils import WATER_WEIGHT
 from .checks import say
 from .discharge import exit_gradients, extent_of, in_words, inflows
 from .flow_doubts import warn_of_kept_flow, warn_of_low_reservoirs, warn_of_sealed_ground
-from .site_doubts import warn_of_reservoirs
+from .site_doubts import warn_of_heads, warn_of_reservoirs
 from .site_flow import boundaries_of_stage, boundary_of, wet_soils
 
 
@@ -164,6 +164,7 @@ def _flow(
         raise mpm.InputError("no boundary with a condition is at the surface of the soils that are there")
     warn_of_reservoirs(body, acting, path)
     warn_of_low_reservoirs(body, facets, acting, where)
+    warn_of_heads(body, facets, acting, where)
     dries = any(not isinstance(soil.retention, water.AlwaysSaturated) for soil in soils.values())
     flow = water.Seepage(body, soils, facets, acting, cell_tags=cells, degree=1 if dries else 2, geometry=geometry)
     try:

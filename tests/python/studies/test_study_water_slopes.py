@@ -256,3 +256,24 @@ def test_rain_in_metres_a_second_and_a_flux_in_millimetres_a_day_are_said(given,
     text = "[boundaries.crest]\nrain = [[0.0, 0.5], [2.0, 100.0], [10.0, 100.0], [12.0, 0.5]]\n"
     said = doubts(site("rain", tmp_path, (text, f"[boundaries.crest]\n{given}\n")))
     assert len(said) == bool(words) and all(re.search(words, text) for text in said), said
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        (("reservoir = [[0.0, 7.0]", "reservoir = [[0.0, 6.0]"), ""),
+        (
+            ("reservoir = [[0.0, 7.0], [3.0, 1.0]]", "head = [[0.0, 7.0], [3.0, 1.0]]"),
+            "the head of 'face' is up to 7 m above",
+        ),
+        (
+            ("[boundaries.face]", "[boundaries.right]\nhead = 7.0\n\n[boundaries.face]"),
+            "",
+        ),  # groundwater beside the section
+        (("[boundaries.face]", "[boundaries.base]\nhead = 7.0\n\n[boundaries.face]"), ""),  # and below it
+    ],
+)
+def test_a_head_above_the_ground_that_bears_no_water_is_said(change, words, tmp_path):
+    """The toe of the bank is at y = 0."""
+    said = [text for text in doubts(site("drawdown", tmp_path, change)) if "the head of" in text]
+    assert len(said) == bool(words) and all(words in text for text in said), said
