@@ -16,7 +16,7 @@ from common.discharge import exit_gradients, extent_of, in_words, inflow_column,
 from common.field_files import FieldFiles
 from common.field_plots import save_curves
 from common.figures import Pictures
-from common.flow_doubts import warn_of_later_changes, warn_of_sealed_ground
+from common.flow_doubts import warn_of_degree, warn_of_later_changes, warn_of_sealed_ground
 from common.flow_steps import FlowSteps
 from common.options import add_count, add_number, add_switch, study_parser
 from common.page import Page
@@ -157,6 +157,7 @@ def main(arguments: list[str] | None = None) -> int:
     start = perf_counter()
     site = read_water_site(a.site, comm, a.cell_size)
     warn_of_later_changes(a.days, site.boundary, a.site)
+    warn_of_degree(int(a.elements[1]), site.varies, site.soils)
     folder = open_results(a, comm)
     flow = site.seepage(int(a.elements[1]))
     names = [c.facet_tag for c in site.boundary]

@@ -120,6 +120,20 @@ def warn_of_later_changes(
         say(f"{path}: the run ends after {days:g} days (--days), and leaves out what comes later: {', '.join(said)}")
 
 
+def warn_of_degree(degree: int, varies: bool, soils: Mapping[str, water.PorousSoil]) -> None:
+    """Warn of quadratic elements for a flow in time through soil that dries, which water hardly enters again.
+
+    Args:
+        degree: of the elements.
+        varies: whether the flow changes with time.
+        soils: of the flow, by name.
+    """
+    drying = [repr(name) for name, soil in soils.items() if not isinstance(soil.retention, water.AlwaysSaturated)]
+    if degree == 2 and varies and drying:
+        say(f"--elements is P2: water that infiltrates hardly enters dry soil in quadratic triangles, unless {' and '.join(drying)} dries over "
+            "suctions of several cells (docs/water.md); take P1 for rain on dry soil and rising levels")  # fmt: skip
+
+
 def warn_of_rigid_soil(soils: Mapping[str, water.PorousSoil], boundary: Iterable[Any], path: Any) -> None:
     """Warn of soil without a compressibility below a reservoir whose level changes: its pore water neither bears water that comes nor keeps its pressure.
 
