@@ -58,8 +58,12 @@ LACKING, FINEST = 1e-2, 1.5e-3
 """Fraction of its strength that a cell may lack in equilibrium; where one lacks more, the tolerance of the out-of-balance force falls
 in tenths, as long as it is above this fraction of the one that was given [-]"""
 
+SETTLED = 2e-4
+"""Out-of-balance force, and fraction of its strength that a cell lacks, below which a body is at rest that has moved far, or in the last step
+[-]: its motion dies away without end, as that of soil without cohesion beside a loaded surface, and factors are less accurate than that"""
+
 STEADY = 0.8
-"""Fraction of the residual of half the time before, above which the motion counts as steady"""
+"""Fraction of the residual, and of the rate of the displacement, of half the time before, above which the motion counts as steady"""
 
 
 @dataclass
@@ -143,7 +147,8 @@ def relax(
         if result.balanced and lacks and tolerance > FINEST * solver.relaxed_tolerance:
             tolerance, result.balanced = 0.1 * tolerance, False
         # Soil that is still elastic lacks nothing, however far the body is from equilibrium: both must be small.
-        if result.balanced or max(result.residual[-1], result.missing[-1]) <= solver.missing_tolerance:
+        enough = max(solver.missing_tolerance, SETTLED if result.growth[-1] > reference else 0.0)
+        if result.balanced or max(result.residual[-1], result.missing[-1]) <= enough:
             result.outcome = "equilibrium"
             return result
         if _flows(result, reference):
@@ -156,6 +161,9 @@ def relax(
                 result.reason += f"; the stresses carry {result.carried[-1]:.2%} of the load"
             return result
         theta *= NEXT_THETA[len(residuals) - 2]
+    if result.residual and max(result.residual[-1], result.missing[-1]) <= SETTLED:
+        result.outcome = "equilibrium"
+        return result
     last = result.residual[-1] if result.residual else np.inf
     result.reason = f"residual {last:.1e} after {solver.max_steps} steps of relaxation"
     return result
@@ -195,8 +203,16 @@ def _record(result: Relaxation, body: Body, step: EquilibriumStep, theta: float,
 
 
 def _flows(result: Relaxation, reference: float) -> bool:
-    """Whether the displacement has grown beyond the reference, at a rate that falls no more."""
-    if result.growth[-1] <= reference:
+    """Whether the displacement has grown beyond the reference, at a rate that falls no more.
+
+    The residual alone does not show it: steps of Newton's method leave some of it, which is most of it where the motion dies away slowly, as
+    that of soil without cohesion beside a loaded surface.
+    """
+    if result.growth[-1] <= reference or result.missing[-1] <= SETTLED:
         return False
-    earlier = float(np.interp(0.5 * result.time[-1], result.time, result.residual))
-    return result.residual[-1] > STEADY * earlier or result.growth[-1] > RUN_AWAY * reference
+    time, growth = np.array([0.0, *result.time]), np.array([0.0, *result.growth])
+    rate = np.diff(growth) / np.diff(time)
+    steady = all(
+        values[-1] > STEADY * float(np.interp(0.5 * time[-1], time[1:], values)) for values in (result.residual, rate)
+    )
+    return steady or result.growth[-1] > RUN_AWAY * reference
