@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import fenics_bridge as bridge
 from fenics_bridge import water
 from fenics_bridge.compat import cell_dofs, cell_nodes, facet_nodes
 from fenics_bridge.fem.supports import tagged_facets
+from fenics_bridge.water.soils import WATER_WEIGHT
 
 from .checks import say
 from .site_keys import DAY, STAGE_WATER, changes_of
@@ -29,6 +30,15 @@ FLOODED = 0.01
 
 LEAST_RAIN = 1e-3
 """Rain [mm/day] below which it is probably in m/s: 1 m a day is 1.2e-5 m/s"""
+
+SAMPLES = 400
+"""Places along a level of water at which it is compared with the ground"""
+
+LIGHTEST = 1e3
+"""Unit weight [N/m3] below which one is left out on purpose, or in kN/m3, which is said elsewhere"""
+
+STANDING, STEEPEST = 0.02, 0.01
+"""Depth of water over the height of a mesh from which on it stands on the ground, and slope of a level that may be rounded"""
 
 LOOSEST = 1e-5
 """Compressibility [1/Pa] above which it is probably in other units, or a modulus"""
@@ -47,6 +57,59 @@ def warn_of_depth(domain: Any, levels: Iterable[float], where: str) -> None:
     if level - high > DEEPEST * (high - low):
         say(f"{where} is {level:g} m, {level - high:.3g} m above the top of the mesh, which is {high - low:.3g} m high: levels are elevations "
             "in m, not depths or pressures")  # fmt: skip
+
+
+def warn_of_buoyant_weight(unit_weight: Mapping[str, float], stages: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """Warn of soils lighter than water in a site whose stages have water, where unit weights are those of the saturated soil.
+
+    Args:
+        unit_weight: by soil [N/m3].
+        stages: rows of the file at a path.
+        path: of the file.
+    """
+    wet = any("water_level" in row or row.get("steady_flow", False) for row in stages)
+    light = [soil for soil, weight in unit_weight.items() if LIGHTEST < weight < WATER_WEIGHT]
+    if wet and light:
+        say(f"{path}: {' and '.join(map(repr, light))} {'is' if len(light) == 1 else 'are'} lighter than water, {unit_weight[light[0]]:g} N/m3: "
+            "unit_weight is that of the saturated soil, such as 18e3, not the one under buoyancy, and below the water table the soil floats")  # fmt: skip
+
+
+def warn_of_slanting_water(domain: Any, cell_tags: Any, soils: Sequence[str], level: np.ndarray, where: str) -> None:
+    """Warn of a level of water that slopes above the ground of a section, where water stands and its surface is level. Collective.
+
+    Args:
+        domain, cell_tags: of the section.
+        soils: their names; the ground is the top of all of them.
+        level: points (k, 2) of the level [m].
+        where: it stands in the file.
+    """
+    low, high = ends_of_height(domain)
+    names = bridge.names_of(cell_tags)
+    own = bridge.background_arrays(domain, cell_tags)
+    soil = np.isin(own["cell_tags"], [tag for name in soils for tag in names.get(name, (name,))])
+    corners = own["points"][own["cells"][soil]]
+    x = np.linspace(*level[[0, -1], 0], SAMPLES)
+    ground = domain.comm.allreduce(top_of(corners, x), np.maximum)
+    above = np.interp(x, *level.T) - ground
+    inside = np.isfinite(ground)
+    standing = inside[1:] & inside[:-1] & (np.minimum(above[1:], above[:-1]) > STANDING * (high - low))
+    slope = np.abs(np.diff(np.interp(x, *level.T)) / np.diff(x))
+    wrong = np.flatnonzero(standing & (slope > STEEPEST))
+    if len(wrong):
+        worst = wrong[np.argmax(above[wrong])]
+        say(f"{where} slopes by 1:{1 / slope[worst]:.2g} near x = {x[worst]:.4g} m, where it is {above[worst]:.2g} m above the ground: water that "
+            "stands there is level, and presses on the ground as deep as the level says; let the level follow the ground, or lie below it")  # fmt: skip
+
+
+def top_of(corners: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Height of the top of triangles (m, 3, 2) [m] at abscissas x (n,) [m]; minus infinity where there is none."""
+    ends = corners[:, [(0, 1), (1, 2), (2, 0)]].reshape(-1, 2, 2)
+    ends = np.take_along_axis(ends, np.argsort(ends[:, :, :1], axis=1), axis=1)
+    found = np.full(len(x), -np.inf)
+    for (x0, y0), (x1, y1) in ends[ends[:, 1, 0] > ends[:, 0, 0]]:
+        a, b = np.searchsorted(x, (x0, x1))
+        found[a:b] = np.maximum(found[a:b], y0 + (y1 - y0) * (x[a:b] - x0) / (x1 - x0))
+    return found
 
 
 def warn_of_reservoirs(domain: Any, boundary: Iterable[Any], path: Any) -> None:

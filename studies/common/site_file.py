@@ -46,7 +46,7 @@ import mpm_core as mpm
 
 from .checks import say
 from .hardening_doubts import k0_doubt, secant_doubt
-from .site_doubts import warn_of_pressures, warn_of_water
+from .site_doubts import warn_of_buoyant_weight, warn_of_pressures, warn_of_water
 from .site_fields import SoilField, fields_of, values_of
 from .site_interfaces import fractions_of, in_stages, split_beside, weakened
 from .site_k0 import from_the_beginning, k0_of, overconsolidation_of
@@ -319,6 +319,7 @@ def site_of(
         say(
             f"{path}: no stage fills the cells of {names}, which therefore hold no soil; name it in fill of a stage where it is there"
         )
+    warn_of_buoyant_weight(weights, rows, path)
     site.stages = from_the_beginning(site.stages, site, begins_later or not rows or "day" not in rows[0], path)
     site.stages = with_strength_ratios(site.stages, site, table.get("laws", {}), path)
     return site

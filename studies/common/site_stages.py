@@ -11,7 +11,7 @@ import numpy as np
 import fenics_bridge as bridge
 import mpm_core as mpm
 
-from .site_doubts import warn_of_depth
+from .site_doubts import warn_of_depth, warn_of_slanting_water
 from .site_keys import require_push
 from .site_laws import is_number
 from .site_supports import support_of
@@ -64,7 +64,7 @@ def stage_of(given: Mapping[str, Any], number: int, site: Site, laws: Mapping[st
         support=[support_of(name, kind, f"{where}.support.{name}", site.domain, site.facet_tags)
                  for name, kind in given.get("support", {}).items()],
         release=given.get("release", ()),
-        pore_pressure=_water(given["water_level"], where, site.domain) if "water_level" in given else None,
+        pore_pressure=_water(given["water_level"], where, site) if "water_level" in given else None,
         reset_displacement=reset,
         install={name: site.members[name] for name in install},
         remove=remove,
@@ -84,7 +84,7 @@ def _member_names(given: Mapping[str, Any], key: str, site: Site, where: str) ->
     return names
 
 
-def _water(level: Any, where: str, domain: Any) -> Any:
+def _water(level: Any, where: str, site: Site) -> Any:
     """Pore pressures below a water level: a number, or points (x, level) of its surface. Collective."""
     points = level if isinstance(level, list) else [[0.0, level]]
     good = points and all(
@@ -94,5 +94,8 @@ def _water(level: Any, where: str, domain: Any) -> Any:
         raise mpm.InputError(
             f"{where}: water_level is {level!r}, expected a number [m] or points [x, level] with x rising"
         )
-    warn_of_depth(domain, [height for _, height in points], f"{where}: water_level")
+    where = f"{where}: water_level"
+    warn_of_depth(site.domain, [height for _, height in points], where)
+    if len(points) > 1 and site.dimension == 2:
+        warn_of_slanting_water(site.domain, site.cell_tags, site.soils, np.array(points, dtype=float), where)
     return bridge.hydrostatic(np.array(level, dtype=float))

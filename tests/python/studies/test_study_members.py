@@ -101,8 +101,8 @@ def test_a_braced_pit_has_a_factor_of_safety_and_fails_without_its_members(tmp_p
     assert json.loads((tmp_path / "with" / "summary.json").read_text())["factor_of_safety"] > 1.5
     without = site_in(tmp_path, "".join(line for line in SITE.splitlines(True) if not line.startswith("install")))
     options = f"--site {without} --cell-size 3 --meshes 1 --start 0.8 --output {tmp_path / 'without'}"
-    with pytest.raises(mpm.InputError, match=r"only \d.*% of the load is carried"):
-        safety.main(options.split())
+    assert safety.main(options.split()) == 0
+    assert json.loads((tmp_path / "without" / "summary.json").read_text())["factor_of_safety"] < 0.8
 
 
 NAILED = (ROOT / "meshes" / "nailed_slope.toml").read_text()
@@ -133,10 +133,9 @@ def test_nails_of_a_site_without_stages_hold_its_slope_and_move_with_it(tmp_path
     assert 0 < first < last <= 163e3
     assert abs(float(rows[-1]["facing_moment_N_m_per_m"])) <= 15e3 * (1 + 1e-9)
     without = nailed_in(tmp_path, NAILED[: NAILED.index("[members.facing]")])
-    with pytest.raises(mpm.InputError, match=r"only \d.*% of the load is carried"):
-        importlib.import_module("safety").main(
-            f"--site {without} --cell-size 1.5 --meshes 1 --start 0.9 --output {tmp_path / 'without'}".split()
-        )
+    options = f"--site {without} --cell-size 1.5 --meshes 1 --start 0.9 --output {tmp_path / 'without'}"
+    assert importlib.import_module("safety").main(options.split()) == 0
+    assert json.loads((tmp_path / "without" / "summary.json").read_text())["factor_of_safety"] < 1.0
 
 
 def test_a_factor_by_particles_has_the_members_of_a_site_without_stages(tmp_path, monkeypatch):
