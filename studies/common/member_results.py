@@ -51,6 +51,12 @@ def stage_forces(site: bridge.FemSite, name: str) -> StageForces:
     return StageForces(site.number, name, {each: site.fem.member_forces(each) for each in site.fem.members})
 
 
+def last_forces(fem: bridge.QuasiStatic, name: str) -> list[StageForces]:
+    """The forces of all members of finite elements now, as those of one stage of that name; none without members. Collective."""
+    forces = {each: fem.member_forces(each) for each in fem.members}
+    return [StageForces(1, name, forces)] if forces else []
+
+
 def axial_column(member: str) -> str:
     """Name of the column of a member's axial force."""
     return f"{member.replace(' ', '_')}_axial_force_N_per_m"
@@ -129,11 +135,11 @@ def member_pictures(stages: list[StageForces], folder: Path) -> Pictures:
     return pictures
 
 
-def captions(stages: list[StageForces]) -> dict[str, str]:
-    """Captions of `member_pictures`, by file name."""
+def captions(stages: list[StageForces], when: str = "after each stage") -> dict[str, str]:
+    """Captions of `member_pictures`, by file name; when: they have these forces."""
     names = dict.fromkeys(name for stage in stages for name in stage.forces)
-    beams = {file_name(name): f"Member {name} after each stage: {BEAM}" for name in names}
-    return {**beams, "axial_forces": "Largest axial force of each bar and strut after each stage; tension is positive"}
+    beams = {file_name(name): f"Member {name} {when}: {BEAM}" for name in names}
+    return {**beams, "axial_forces": f"Largest axial force of each bar and strut {when}; tension is positive"}
 
 
 def file_name(member: str) -> str:
@@ -186,8 +192,10 @@ def _curves(forces: mpm.MemberForces, upright: bool) -> dict[str, tuple[np.ndarr
 
 
 def save_axial_forces(path: Path, names: list[str], stages: list[StageForces]) -> None:
-    """Largest axial force of bars and struts after each stage."""
+    """Largest axial force of bars and struts after each stage, or of one stage alone as bars."""
     shown = [stage for stage in stages if stage.forces]
+    if len(shown) == 1:
+        return _save_bars(path, {name: largest(shown[0].forces[name].axial_force) for name in names})
     with curve_figure(path, (5.4, 3.4)) as axes:
         for k, name in enumerate(names):
             values = [1e-3 * largest(s.forces[name].axial_force) if name in s.forces else np.nan for s in shown]
@@ -196,6 +204,17 @@ def save_axial_forces(path: Path, names: list[str], stages: list[StageForces]) -
         axes.set(xlabel="Stage", ylabel="Axial force [kN/m]")
         axes.axhline(0, color="black", linewidth=0.5)
         axes.legend(fontsize=8)
+
+
+def _save_bars(path: Path, forces: Mapping[str, float]) -> None:
+    """Axial forces [N/m] by the name of the member, from above in their order."""
+    with curve_figure(path, (5.4, 0.9 + 0.28 * len(forces))) as axes:
+        axes.barh(list(forces), [1e-3 * force for force in forces.values()], height=0.6, color=CURVES[0], zorder=2)
+        axes.invert_yaxis()
+        axes.tick_params(axis="y", length=0)
+        axes.grid(False, axis="y")
+        axes.set(xlabel="Largest axial force [kN/m]")
+        axes.axvline(0, color="black", linewidth=0.5)
 
 
 def _table(stages: list[StageForces]) -> str:

@@ -18,6 +18,8 @@ from .checks import check_effect, say
 from .collapse_runs import UNDECIDED
 from .field_plots import bend, mechanism_field, save_convergence, save_curves, save_mechanism
 from .figures import Pictures
+from .member_results import captions as captions_of_members
+from .member_results import force_row, last_forces, member_pictures, write_members
 from .page import Page
 from .quiet import NOT_REACHED, without_warning
 from .results import open_results
@@ -100,7 +102,12 @@ def site_study(
     summary = {name: runs[-1].value, "failed_at": runs[-1].failed_at, **more(site),
                "failure_shown": runs[-1].failed, "meshes": rows, "curve_value": runs[-1].curve[:, 0],
                "curve_largest_displacement_m": runs[-1].curve[:, 1], "wall_seconds": perf_counter() - start}  # fmt: skip
-    drawn = {**_drawn(folder, sizes, runs, label, site, model), **strength_pictures(site, model, folder)}
+    forces = last_forces(model, "last equilibrium")
+    write_members(folder, forces, comm)
+    if forces:
+        summary["members_in_last_equilibrium"] = force_row(model.members, forces[0].forces)
+    drawn = {**_drawn(folder, sizes, runs, label, site, model), **strength_pictures(site, model, folder),
+             **member_pictures(forces, folder)}  # fmt: skip
     said = []
     for row in rows:
         sure = "" if row["failure_shown"] else f", a lower bound only: {row['reason']}"
@@ -110,7 +117,7 @@ def site_study(
     captions = {"mechanism": "Mechanism on the finest mesh, with the soils and, where there is water, the water table",
                 "value_displacement": f"{value} over the largest displacement on the way to failure",
                 "convergence": f"{value} over the size of the cells",
-                **STRENGTHS}  # fmt: skip
+                **STRENGTHS, **captions_of_members(forces, f"in the last equilibrium on the way to the {value[0].lower() + value[1:]}")}  # fmt: skip
     write_summary(folder, a, summary, comm, Page(captions=captions), drawn, "\n".join(said))
     return 0 if all(run.failed for run in runs) else UNDECIDED
 

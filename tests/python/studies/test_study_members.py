@@ -98,7 +98,17 @@ def test_a_braced_pit_has_a_factor_of_safety_and_fails_without_its_members(tmp_p
     safety = importlib.import_module("safety")
     options = f"--site {site_in(tmp_path)} --cell-size 3 --meshes 1 --start 0.8 --output {tmp_path / 'with'}"
     assert safety.main(options.split()) == 0
-    assert json.loads((tmp_path / "with" / "summary.json").read_text())["factor_of_safety"] > 1.5
+    found = json.loads((tmp_path / "with" / "summary.json").read_text())
+    assert found["factor_of_safety"] > 1.5
+    forces = found["members_in_last_equilibrium"]
+    assert forces["lower_strut_axial_force_N_per_m"] < -50e3  # it holds the wall
+    with open(tmp_path / "with" / "members.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["member"] for row in rows} == {"wall", "upper strut", "lower strut"}
+    assert min(float(row["axial_force_N_per_m"]) for row in rows if row["member"] == "lower strut") == pytest.approx(
+        forces["lower_strut_axial_force_N_per_m"], rel=1e-4
+    )
+    assert {"member_wall.png", "axial_forces.png"} <= {path.name for path in (tmp_path / "with").iterdir()}
     without = site_in(tmp_path, "".join(line for line in SITE.splitlines(True) if not line.startswith("install")))
     options = f"--site {without} --cell-size 3 --meshes 1 --start 0.8 --output {tmp_path / 'without'}"
     assert safety.main(options.split()) == 0
