@@ -70,7 +70,14 @@ def parser() -> ArgumentParser:
         "also find the seismic coefficient at which soil of full strength fails; of a site "
         "against the first axis where --seismic-coefficient is below 0",
     )
-    add_number(p, "--start", 0.5, "-", "first factor of safety to try; the slope must be stable with it", above=0)
+    add_number(
+        p,
+        "--start",
+        0.5,
+        "-",
+        "first factor of safety to try; it is halved, up to three times, where the slope does not stand with it",
+        above=0,
+    )
     add_flow_options(p)
     add_site_option(p)
     p.add_argument(

@@ -43,7 +43,14 @@ def add_water_slope_options(parser: ArgumentParser, site: str, days: float, suct
     add_number(p, "--slower", 1.0, "-", "factor by which all times in the tables of the site are multiplied", above=0)
     add_count(p, "--factor-times", 6, "number of times, evenly over --days, at which the factor of safety is found, in addition "
               "to the beginning, the corners of the site's tables and three times before each of them")  # fmt: skip
-    add_number(p, "--start", 0.3, "-", "first factor of safety to try; the slope must be stable with it", above=0)
+    add_number(
+        p,
+        "--start",
+        0.3,
+        "-",
+        "first factor of safety to try; it is halved, up to three times, where the slope does not stand with it",
+        above=0,
+    )
     add_switch(p, "--davis", True, "factor of safety with associated flow and the strength that Davis (1968) gives for soil of "
                "less dilation; otherwise with the flow rule of the site's soils")  # fmt: skip
     add_switch(p, "--suction", suction, "add suction times effective saturation to the effective stress (Bishop)")
