@@ -26,6 +26,7 @@ from common.results import open_results
 from common.site_file import Site
 from common.site_k0 import all_at_rest, begin_at_rest, say_left_out
 from common.site_runs import add_site_option, check_site_options, site_study
+from common.site_slides import IN_TETRAHEDRON
 from common.slope_case import GRAVITY, SUPPORTS, soil_of
 from common.slope_fem import (
     add_fem_slope_options,
@@ -186,7 +187,10 @@ def site_by_particles(a: Namespace, site: Site) -> bridge.ParticleSafety:
     """The factor of a site by particles. Collective."""
 
     def weakened(factor: float) -> mpm.Model:
-        model = site.particles(3, bridge.reduced_strength(site.laws, factor, site.tags_of(a.unreduced)))
+        model = site.particles(
+            IN_TETRAHEDRON if site.dimension == 3 else 3,
+            bridge.reduced_strength(site.laws, factor, site.tags_of(a.unreduced)),
+        )
         gravity = model.gravity
         gravity[0] += a.seismic_coefficient * GRAVITY
         model.set_gravity(gravity)

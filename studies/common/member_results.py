@@ -26,6 +26,10 @@ COLUMNS = (
     "stage", "name", "member", "x_m", "y_m", "displacement_x_m", "displacement_y_m", "axial_force_N_per_m",
     "shear_force_N_per_m", "moment_N_m_per_m",
 )  # fmt: skip
+COLUMNS_OF_BODY = (
+    "stage", "name", "member", "x_m", "y_m", "z_m", "displacement_x_m", "displacement_y_m", "displacement_z_m", "axial_force_N",
+)  # fmt: skip
+"""In three dimensions, where no member bends and a force is that of a single one"""
 HOOPS = ("hoop_force_N_per_m", "hoop_moment_N_m_per_m")
 """Further columns of members of axisymmetric bodies"""
 LEGEND_COLUMNS = 4
@@ -57,9 +61,14 @@ def last_forces(fem: bridge.QuasiStatic, name: str) -> list[StageForces]:
     return [StageForces(1, name, forces)] if forces else []
 
 
-def axial_column(member: str) -> str:
-    """Name of the column of a member's axial force."""
-    return f"{member.replace(' ', '_')}_axial_force_N_per_m"
+def axial_column(member: str, dim: int = 2) -> str:
+    """Name of the column of a member's axial force, which in plane strain is that of a slice 1 m thick; dim: of its points."""
+    return f"{member.replace(' ', '_')}_axial_force_N{'' if dim == 3 else '_per_m'}"
+
+
+def axial_label(dim: int = 2) -> str:
+    """Label of the axis of axial forces; dim: of the points of members."""
+    return f"Axial force [kN{'' if dim == 3 else '/m'}]"
 
 
 def moment_column(member: str) -> str:
@@ -76,12 +85,12 @@ def force_columns(members: Mapping[str, mpm.Member]) -> list[str]:
     """Names of the columns of `force_row`."""
     bending = [moment_column(name) for name, member in members.items() if member.bending_stiffness]
     shear = [shear_column(name) for name, member in members.items() if member.bending_stiffness]
-    return [*map(axial_column, members), *bending, *shear]
+    return [*(axial_column(name, member.dim) for name, member in members.items()), *bending, *shear]
 
 
 def force_row(members: Mapping[str, mpm.Member], forces: Mapping[str, mpm.MemberForces]) -> dict[str, float]:
     """Axial force of each member, and moment and shear force of each beam, where they are largest, for a table."""
-    axial = {axial_column(name): largest(one.axial_force) for name, one in forces.items()}
+    axial = {axial_column(name, members[name].dim): largest(one.axial_force) for name, one in forces.items()}
     beams = {name: one for name, one in forces.items() if members[name].bending_stiffness}
     moments = {moment_column(name): largest(one.moment) for name, one in beams.items()}
     hoops = {f"{name.replace(' ', '_')}_{column}": largest(values) for name, one in beams.items()
@@ -108,11 +117,11 @@ def write_members(folder: Path, stages: list[StageForces], comm: MPI.Comm) -> No
     if not any(stage.forces for stage in stages):
         return
     on_first_rank(comm, lambda: write_text(folder / "members.csv", _table(stages)), OutputError)
-    shells = _has_shells(stages)
+    shells, dim = _has_shells(stages), _dimension(stages)
     with ParticleOutput(folder / "members", comm) as output:
         for stage in stages:
-            parts = [_fields(forces, number, shells) for number, forces in enumerate(stage.forces.values())] or [
-                _fields(None, 0, shells)
+            parts = [_fields(forces, number, shells, dim) for number, forces in enumerate(stage.forces.values())] or [
+                _fields(None, 0, shells, dim)
             ]
             fields = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
             mine = slice(None) if comm.rank == 0 else slice(0)
@@ -183,7 +192,7 @@ def _curves(forces: mpm.MemberForces, upright: bool) -> dict[str, tuple[np.ndarr
         "Displacement [mm]": (1e3 * forces.displacement[:, 0 if upright else 1], nodes),
         "Moment [kN m/m]": (1e-3 * forces.moment, nodes),
     }
-    segments = {"Shear force [kN/m]": forces.shear_force, "Axial force [kN/m]": forces.axial_force}
+    segments = {"Shear force [kN/m]": forces.shear_force, axial_label(): forces.axial_force}
     if forces.hoop_force is not None and forces.hoop_moment is not None:
         segments["Hoop force [kN/m]"] = forces.hoop_force
         if np.ptp(forces.positions[:, 0]) > 0:  # a cylinder has none
@@ -201,7 +210,7 @@ def save_axial_forces(path: Path, names: list[str], stages: list[StageForces]) -
             values = [1e-3 * largest(s.forces[name].axial_force) if name in s.forces else np.nan for s in shown]
             axes.plot(range(len(shown)), values, "o-", color=CURVES[k % len(CURVES)], markersize=3.5, label=name)
         axes.set_xticks(range(len(shown)), [stage.name for stage in shown], rotation=25, ha="right")
-        axes.set(xlabel="Stage", ylabel="Axial force [kN/m]")
+        axes.set(xlabel="Stage", ylabel=axial_label(_dimension(stages)))
         axes.axhline(0, color="black", linewidth=0.5)
         axes.legend(fontsize=8)
 
@@ -221,13 +230,16 @@ def _table(stages: list[StageForces]) -> str:
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     timed = any(stage.time is not None for stage in stages)
-    hoops = HOOPS if _has_shells(stages) else ()
-    rows.writerow((*COLUMNS[:2], *(["time_days"] if timed else []), *COLUMNS[2:], *hoops))
+    hoops, solid = HOOPS if _has_shells(stages) else (), _dimension(stages) == 3
+    columns = COLUMNS_OF_BODY if solid else COLUMNS
+    rows.writerow((*columns[:2], *(["time_days"] if timed else []), *columns[2:], *hoops))
     for stage in stages:
         for name, forces in stage.forces.items():
             around = [at_nodes(one) for one in (forces.hoop_force, forces.hoop_moment) if one is not None]
-            values = np.column_stack([forces.positions, forces.displacement, at_nodes(forces.axial_force),
-                                      at_nodes(forces.shear_force), forces.moment, *around])  # fmt: skip
+            bent = [] if solid else [at_nodes(forces.shear_force), forces.moment]
+            values = np.column_stack(
+                [forces.positions, forces.displacement, at_nodes(forces.axial_force), *bent, *around]
+            )
             days = [] if stage.time is None else [f"{stage.time / DAY:.9g}"]
             start = [stage.number, stage.name, *days, name]
             rows.writerows([*start, *(f"{value:.6g}" for value in row)] for row in values)
@@ -239,11 +251,19 @@ def _has_shells(stages: list[StageForces]) -> bool:
     return any(forces.hoop_force is not None for stage in stages for forces in stage.forces.values())
 
 
-def _fields(forces: mpm.MemberForces | None, number: int, shells: bool) -> dict[str, np.ndarray]:
-    """Fields of the nodes of a member; none of them where there is no member. shells: whether there are forces around an axis."""
+def _dimension(stages: list[StageForces]) -> int:
+    """Of the points of members, of which there are some."""
+    return int(next(forces.positions.shape[1] for stage in stages for forces in stage.forces.values()))
+
+
+def _fields(forces: mpm.MemberForces | None, number: int, shells: bool, dim: int) -> dict[str, np.ndarray]:
+    """Fields of the nodes of a member; none of them where there is no member.
+
+    shells: whether there are forces around an axis; dim: of the points of members.
+    """
     scalars = ("axial_force", "shear_force", "moment", *(("hoop_force", "hoop_moment") if shells else ()))
     if forces is None:
-        empty = {"position": np.zeros((0, 2)), "displacement": np.zeros((0, 2)), "member": np.zeros(0, dtype=int)}
+        empty = {"position": np.zeros((0, dim)), "displacement": np.zeros((0, dim)), "member": np.zeros(0, dtype=int)}
         return empty | {name: np.zeros(0) for name in scalars}
     places = {"position": forces.positions, "displacement": forces.displacement}
     values = {name: getattr(forces, name) for name in scalars}

@@ -91,7 +91,7 @@ def _relative(given: Mapping[str, Any], dim: int, where: str) -> mpm.RandomField
     lengths = given.get("lengths")
     if not isinstance(lengths, list) or len(lengths) != dim:
         raise mpm.InputError(
-            f"{where}: lengths is {lengths!r}, expected a correlation length along each of {dim} axes [m], such as [20.0, 2.0]"
+            f"{where}: lengths is {lengths!r}, expected a correlation length along each of {dim} axes [m], such as {[20.0] * (dim - 1) + [2.0]}"
         )
     lognormal = given.get("lognormal", True)
     if not isinstance(lognormal, bool):

@@ -32,7 +32,7 @@ Example of a file:
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -293,6 +293,7 @@ def site_of(
         say(secant_doubt(others[name], f"{path}: laws.{name}"))
     members = {name: member_of(given, f"{path}: members.{name}") for name, given in table.get("members", {}).items()}
     _require_columns(members, path)
+    _require_dimension(members, domain.topology.dim, path)
     rows, names = table.get("stages", []), {} if interfaces is False else fractions_of(table.get("members", {}), path)
     cell_tags, beside = split_beside(domain, cell_tags, laws, members, names)
     at_once = interfaces or (interfaces is None and not rows)
@@ -323,6 +324,15 @@ def site_of(
     site.stages = from_the_beginning(site.stages, site, begins_later or not rows or "day" not in rows[0], path)
     site.stages = with_strength_ratios(site.stages, site, table.get("laws", {}), path)
     return site
+
+
+def _require_dimension(members: Mapping[str, mpm.Member], dim: int, path: Path) -> None:
+    """Require that the points of members have as many coordinates as those of the mesh; path: of the file, for the error."""
+    for name, member in members.items():
+        if member.dim != dim:
+            raise mpm.InputError(
+                f"{path}: members.{name}: its points have {member.dim} coordinates, expected {dim}, as dimension is {dim} in the file of the site"
+            )
 
 
 def _require_columns(members: Collection[str], path: Path) -> None:
