@@ -115,7 +115,7 @@ def colour_limits(quantity: Quantity, values: Iterable[NDArray]) -> tuple[float,
         missing = max(0.0, quantity.least_range - (high - low))
         low, high = low - 0.5 * missing, high + 0.5 * missing
     elif all(frame.min() >= 0 for frame in shown):
-        low = 0.0
+        low, high = 0.0, high or 1.0  # where nothing has moved, no numbers below zero
     if not high > low:
         low, high = low - 0.5, high + 0.5
     ticks = ROUND_TICKS.tick_values(low, high)

@@ -19,15 +19,18 @@ from common import site_slides
 from common.checks import say
 from common.interrupt import Interrupt
 from common.lengths import metres
+from common.member_results import captions
 from common.movie import particle_movie
 from common.options import study_parser
 from common.page import Page
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
+from common.site_field_plots import CAPTIONS as STRENGTHS
 from common.site_field_plots import strength_pictures
 from common.site_file import Site, read_site
 from common.site_slides import add_strength_factor
+from common.solid_plots import captions_for
 from common.stage_runs import add_stage_options, carry_out
 from common.summary import write_summary
 from mpi4py import MPI
@@ -39,7 +42,7 @@ comm = MPI.COMM_WORLD
 CAPTIONS = {
     "stages_displacement": "The soil after each stage, by its displacement",
     "stages_strain": "The soil after each stage, by the strain accumulated since the displacements were reset",
-    "movements": "Largest movements after each stage", **site_slides.CAPTIONS,
+    "movements": "Largest movements after each stage", **site_slides.CAPTIONS, **STRENGTHS,
 }  # fmt: skip
 
 
@@ -175,7 +178,15 @@ def main(arguments: list[str] | None = None) -> int:
             if message:
                 print(f"{who}: {message}", file=sys.stderr)
     said = f"slide, {slide}: largest displacement {metres(moved)} after {result.history['time_s'][-1]:.3g} s"
-    code = write_summary(folder, a, summary, comm, Page(movies=movie, captions=CAPTIONS), drawn, said)
+    code = write_summary(
+        folder,
+        a,
+        summary,
+        comm,
+        Page(movies=movie, captions=captions_for({**CAPTIONS, **captions(run.forces)}, site.dimension)),
+        drawn,
+        said,
+    )
     return interrupt.exit_code or code
 
 

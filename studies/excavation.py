@@ -18,8 +18,10 @@ from common.page import Page
 from common.quiet import NOT_REACHED, without_warning
 from common.ranks import run_study
 from common.results import open_results
+from common.site_field_plots import CAPTIONS as STRENGTHS
 from common.site_field_plots import strength_pictures
 from common.site_file import Site, read_site
+from common.solid_plots import captions_for
 from common.stage_flow import flow_lines
 from common.stage_runs import add_stage_options, carry_out
 from common.summary import write_summary
@@ -122,11 +124,13 @@ def main(arguments: list[str] | None = None) -> int:
     shown = {"stages_displacement": "The soil after each stage, by its displacement, with the water table where there is one",
                 "stages_flow": "Steady flow of the water around the walls: total head, flow lines and water table",
                 "stages_strain": "The soil after each stage, by the strain accumulated since the displacements were reset",
-                "movements": "Largest movements after each stage", **captions(run.forces)}  # fmt: skip
+                "movements": "Largest movements after each stage", **captions(run.forces), **STRENGTHS}  # fmt: skip
     said = flow_lines(last.get("stage", ""), run.site.state.pore_pressure)
     said += [COMPARED[name].format(value) if value is not None else NOT_CARRIED for name, value in compared.items()]
     drawn = {**run.drawn(site.stages, folder), **strength_pictures(site, run.site.fem, folder)}
-    return write_summary(folder, a, summary, comm, Page(captions=shown), drawn, "\n".join(said))
+    return write_summary(
+        folder, a, summary, comm, Page(captions=captions_for(shown, site.dimension)), drawn, "\n".join(said)
+    )
 
 
 if __name__ == "__main__":

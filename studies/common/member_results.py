@@ -204,7 +204,7 @@ def save_axial_forces(path: Path, names: list[str], stages: list[StageForces]) -
     """Largest axial force of bars and struts after each stage, or of one stage alone as bars."""
     shown = [stage for stage in stages if stage.forces]
     if len(shown) == 1:
-        return _save_bars(path, {name: largest(shown[0].forces[name].axial_force) for name in names})
+        return _save_bars(path, {name: largest(shown[0].forces[name].axial_force) for name in names}, _dimension(stages))
     with curve_figure(path, (5.4, 3.4)) as axes:
         for k, name in enumerate(names):
             values = [1e-3 * largest(s.forces[name].axial_force) if name in s.forces else np.nan for s in shown]
@@ -215,14 +215,14 @@ def save_axial_forces(path: Path, names: list[str], stages: list[StageForces]) -
         axes.legend(fontsize=8)
 
 
-def _save_bars(path: Path, forces: Mapping[str, float]) -> None:
-    """Axial forces [N/m] by the name of the member, from above in their order."""
+def _save_bars(path: Path, forces: Mapping[str, float], dim: int) -> None:
+    """Axial forces [N/m], in three dimensions [N], by the name of the member, from above in their order; dim: of their points."""
     with curve_figure(path, (5.4, 0.9 + 0.28 * len(forces))) as axes:
         axes.barh(list(forces), [1e-3 * force for force in forces.values()], height=0.6, color=CURVES[0], zorder=2)
         axes.invert_yaxis()
         axes.tick_params(axis="y", length=0)
         axes.grid(False, axis="y")
-        axes.set(xlabel="Largest axial force [kN/m]")
+        axes.set(xlabel=f"Largest {axial_label(dim)[0].lower()}{axial_label(dim)[1:]}")
         axes.axvline(0, color="black", linewidth=0.5)
 
 

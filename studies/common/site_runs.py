@@ -28,7 +28,7 @@ from .site_field_plots import strength_pictures
 from .site_file import Site, read_site
 from .site_k0 import say_left_out
 from .site_mesh import cell_size_of
-from .solid_plots import save_solid_mechanism
+from .solid_plots import captions_for, save_solid_mechanism
 from .solids import solid_mechanism
 from .slope_fem import finite_elements, step_line
 from .summary import write_summary
@@ -118,7 +118,9 @@ def site_study(
                 "value_displacement": f"{value} over the largest displacement on the way to failure",
                 "convergence": f"{value} over the size of the cells",
                 **STRENGTHS, **captions_of_members(forces, f"in the last equilibrium on the way to the {value[0].lower() + value[1:]}")}  # fmt: skip
-    write_summary(folder, a, summary, comm, Page(captions=captions), drawn, "\n".join(said))
+    write_summary(
+        folder, a, summary, comm, Page(captions=captions_for(captions, site.dimension)), drawn, "\n".join(said)
+    )
     return 0 if all(run.failed for run in runs) else UNDECIDED
 
 

@@ -24,7 +24,7 @@ from .figures import Pictures
 from .history import History
 from .interrupt import Interrupt
 from .lengths import metres
-from .member_results import axial_column, force_columns, force_row
+from .member_results import axial_column, axial_label, force_columns, force_row
 from .movie import particle_frame, particle_movie
 from .options import add_count, add_number, add_switch
 from .output_options import add_picture_options
@@ -35,10 +35,12 @@ from .quiet import NOT_REACHED, without_warning
 from .results import open_results
 from .scenes import scene_of
 from .schemes import add_particles_per_cell, add_pic
+from .site_field_plots import CAPTIONS as STRENGTHS
 from .site_field_plots import strength_pictures
 from .site_file import Site, read_site
 from .site_k0 import begin_at_rest
 from .solid_particles import save_solid_particles, solid_frame
+from .solid_plots import captions_for
 from .summary import write_summary
 
 comm = MPI.COMM_WORLD
@@ -178,9 +180,9 @@ def slide_pictures(a: Namespace, result: Slide, scene: Scene | None, folder: Pat
             folder / "largest_displacement.png", history["time_s"], {"largest": largest}, "Largest displacement [m]",
             limits=(0, max(0.1, 1.05 * largest.max()))),
     }  # fmt: skip
-    if axial := {name: 1e-3 * history[axial_column(name)] for name in result.model.members}:
+    if axial := {name: 1e-3 * history[axial_column(name, member.dim)] for name, member in result.model.members.items()}:
         pictures["member_forces"] = lambda: save_history(
-            folder / "member_forces.png", history["time_s"], axial, "Axial force [kN/m]"
+            folder / "member_forces.png", history["time_s"], axial, axial_label(result.model.mesh.dim)
         )
     if a.film and not solid:
         pictures["film"] = lambda: save_animation(folder / "slide", scene, result.frames, "shear_strain", SHEAR_STRAIN)
@@ -234,6 +236,8 @@ def site_slide(a: Namespace) -> int:
     scene = scene_of(model, sorted(site.laws))
     movies = [particle_movie(f"strength divided by {a.factor:g}", scene, result.frames)]
     said = f"strength divided by {a.factor:g}: largest displacement {metres(moved)} after {result.history['time_s'][-1]:.3g} s"
-    page, pictures = Page(movies=movies, captions=CAPTIONS), slide_pictures(a, result, scene, folder)
+    page, pictures = Page(
+        movies=movies, captions=captions_for({**CAPTIONS, **STRENGTHS}, site.dimension)
+    ), slide_pictures(a, result, scene, folder)
     code = write_summary(folder, a, summary, comm, page, {**pictures, **random}, said)
     return interrupt.exit_code or code

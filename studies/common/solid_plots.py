@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,26 @@ TURN = np.radians(30.0)
 """Angle between the normals of triangles beside a sharp edge"""
 TURNED, TURNED_AT_CORNER = 35.0, 10.0
 """Angle between the eye and the direction to a side of a body, and to a corner [degrees]"""
+ZOOM = 0.86
+"""Of a body in its axes, so that the labels beside it stay within the picture"""
+MOST_INTERVALS = 4
+"""Between numbers along the longest side of a body"""
 AXES = ("$x$ [m]", "$y$ [m]", "$z$ [m]")
+
+
+CAPTIONS = {
+    "mechanism": "Mechanism on the finest mesh: displacement of the last increment on the body, and its shear strain in the section along the black line",
+    "stages_displacement": "The body after each stage, and its section along the black line, by the displacement",
+    "stages_strain": "The body after each stage, and its section along the black line, by the strain accumulated since the displacements were reset",
+    "slide_displacement": "Displacement at the end of the slide: all particles, and those of a section through the one that has moved most",
+    "slide_strain": "Accumulated plastic shear strain at the end of the slide: all particles, and those of a section through the one that has moved most",
+}  # fmt: skip
+"""Of pictures of bodies, by the names of their files, in the place of those of sections"""
+
+
+def captions_for(captions: Mapping[str, str], dimension: int) -> dict[str, str]:
+    """Captions of the pictures of a site of two or three dimensions, by file name, where `captions` are those of a section."""
+    return dict(captions) | (CAPTIONS if dimension == 3 else {})
 
 
 def save_solid_mechanism(path: Path, solid: Solid, title: str) -> None:
@@ -165,14 +184,17 @@ def set_view(axes: Any, points: np.ndarray, side: np.ndarray) -> None:
     """Equal axes around points (n, 3) [m], seen from the side to which a horizontal direction (2,) points."""
     low, high = points.min(axis=0), points.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.0)
+    axes.set_box_aspect(high - low, zoom=ZOOM)
     axes.set_proj_type("ortho")
     axes.view_init(elev=ELEVATION, azim=azimuth(side))
-    for label, axis in zip(AXES, (axes.xaxis, axes.yaxis, axes.zaxis)):
-        axis.set_label_text(label, fontsize=7)
+    relative = (high - low) / (high - low).max()
+    for k, axis in enumerate((axes.xaxis, axes.yaxis, axes.zaxis)):
+        axis.set_label_text(AXES[k], fontsize=7)
         axis.set_tick_params(labelsize=6, pad=-2)
-        axis.labelpad = -4
-        axis.set_major_locator(plt.MaxNLocator(4))
+        slender = 1 - np.delete(relative, k).max()  # matplotlib measures distances along an axis by the other sides
+        axis.labelpad = (-6 if k == 2 else 0) + 16 * slender
+        most = max(1, round(MOST_INTERVALS * relative[k]))  # numbers on a short side would overlap
+        axis.set_major_locator(plt.MaxNLocator(most))
 
 
 def draw_section(axes: Axes, section: Section, values: np.ndarray, norm: Normalize, colours: str) -> None:
