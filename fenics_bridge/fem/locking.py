@@ -74,8 +74,9 @@ def warn_of_few_cells(model: Any, mechanism: fem.Function) -> None:
         return
     cells = (high.max() - low.min()) * count.sum() / total.sum()
     if cells < FEWEST and domain.comm.rank == 0:
+        high_as = f"{cells:.2g} cells high" if cells >= 1 else "less than one cell high"
         warnings.warn(
-            f"the soil that moves in the mechanism is {cells:.2g} cells high, so that averages of linear elements reach over all of it: "
+            f"the soil that moves in the mechanism is {high_as}, so that averages of linear elements reach over all of it: "
             f"the load or factor may be up to a tenth too low. Take cells that make it {FEWEST} high at least, or degree=2 (docs/fem.md)",
             RuntimeWarning,
             stacklevel=3,
