@@ -33,12 +33,14 @@ class SoilField:
     """A parameter of a soil that is a random field about its mean.
 
     soil: its name; parameter: as its law calls it; mean: function of heights (n,) [m]; relative: field with the mean 1
+    nominal: value of the law of the soil that is not weakened
     """
 
     soil: str
     parameter: str
     mean: Callable[[NDArray[np.float64]], Any]
     relative: mpm.RandomField
+    nominal: float
 
     def __call__(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at positions [m], shape (n, D): shape (n,)."""
@@ -70,7 +72,7 @@ def fields_of(soil: str, parameters: Mapping[str, Any], dim: int, where: str) ->
         profile = {key: given[key] for key in ("value", "per_metre", "top") if key in given}
         if not (is_number(given.get("value")) and (set(profile) == {"value"} or is_profile(profile))):
             raise mpm.InputError(f"{here} is {given}, expected value, or value, per_metre and top, of a random field")
-        fields.append(SoilField(soil, RANDOM[name], _mean(profile), _relative(given, dim, here)))
+        fields.append(SoilField(soil, RANDOM[name], _mean(profile), _relative(given, dim, here), float(given["value"])))
         numbers[name] = float(given["value"])
     return fields, numbers
 
@@ -137,4 +139,9 @@ def values_of(
     for field in fields:
         rows = np.flatnonzero(np.isin(tags, tags_of([field.soil])))
         values[field.parameter][rows] = field(positions[rows])
+        for tag in tags_of(
+            [field.soil]
+        ):  # the peak of softening soil is a number of the law, which has been divided with it
+            if field.nominal > 0 and tag in laws and has_varying(laws[tag], field.parameter):
+                values[field.parameter][tags == tag] *= nominal_value(laws[tag], field.parameter) / field.nominal
     return values

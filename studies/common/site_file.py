@@ -48,7 +48,7 @@ from .checks import say
 from .hardening_doubts import k0_doubt, secant_doubt
 from .site_doubts import warn_of_buoyant_weight, warn_of_pressures, warn_of_water
 from .site_fields import SoilField, fields_of, values_of
-from .site_interfaces import fractions_of, in_stages, split_beside, weakened
+from .site_interfaces import fractions_of, in_stages, split_beside, weakened, with_ratios_beside
 from .site_k0 import from_the_beginning, k0_of, overconsolidation_of
 from .site_keys import CHANGES, STAGE_WATER, changes_of, member_of, part_of, read_site_table
 from .site_laws import (
@@ -105,8 +105,12 @@ class Site:
     @property
     def soils_with_strength_ratio(self) -> list[str]:
         """Soils whose undrained strength follows the vertical effective stress, from the beginning or by the law of a stage."""
-        by_stages = (str(soil) for stage in self.stages for soil in stage.strength_ratio)
-        return list(dict.fromkeys([*self.strength_ratio, *by_stages]))
+        given = {key for stage in self.stages for key in stage.strength_ratio}
+        return [
+            soil
+            for soil in self.soils
+            if soil in {*self.strength_ratio, *given} or given.intersection(self.tags_of([soil]))
+        ]
 
     @property
     def begins_at_rest(self) -> bool:
@@ -323,6 +327,8 @@ def site_of(
     warn_of_buoyant_weight(weights, rows, path)
     site.stages = from_the_beginning(site.stages, site, begins_later or not rows or "day" not in rows[0], path)
     site.stages = with_strength_ratios(site.stages, site, table.get("laws", {}), path)
+    if beside.walls:
+        site.stages = with_ratios_beside(site.stages, site.laws, beside, lambda soil: site.tags_of([soil]))
     return site
 
 

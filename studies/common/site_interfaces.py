@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from mpm_core.law_warnings import with_inner_laws
+
 import fenics_bridge as bridge
 import mpm_core as mpm
 
@@ -139,3 +141,32 @@ def weakened(laws: dict[int, Any], beside: Interfaces, all_laws: bool) -> dict[i
     """
     chosen = [tag for tag in beside.walls if all_laws or not isinstance(laws[tag], WITHOUT_MEMORY)]
     return laws | {tag: beside.law(tag, laws[tag], beside.fractions) for tag in chosen}
+
+
+def with_ratios_beside(
+    stages: list[bridge.Stage], laws: Mapping[int, Any], beside: Interfaces, tags_of: Any
+) -> list[bridge.Stage]:
+    """Divide strength ratios of softening soil beside walls as its laws are; ratios are then those of cell tags.
+
+    The strength that a ratio gives replaces the peak of such a law, which has the strength of the interface from the beginning. Other
+    laws divide the strengths of all points themselves.
+
+    Args:
+        stages: of the site, after `in_stages`.
+        laws: by cell tag, of the beginning.
+        beside: cells beside walls.
+        tags_of: function of the name of a soil that gives its tags.
+    """
+    acting, changed = dict(laws), []
+    for stage in stages:
+        acting |= {
+            tag: law for key, law in stage.law.items() for tag in ([key] if isinstance(key, int) else tags_of(key))
+        }
+        ratios: dict[int | str, bridge.StrengthRatio] = {}
+        for soil, ratio in stage.strength_ratio.items():
+            for tag in tags_of(soil):
+                weakest = min((beside.fractions[wall] for wall in beside.walls.get(tag, ())), default=1.0)
+                softens = any(isinstance(one, mpm.SofteningMohrCoulomb) for one in with_inner_laws(acting[tag]))
+                ratios[tag] = replace(ratio, ratio=weakest * ratio.ratio) if softens else ratio
+        changed.append(replace(stage, strength_ratio=ratios))
+    return changed

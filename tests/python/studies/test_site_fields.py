@@ -67,6 +67,17 @@ def test_softening_soil_has_a_field_of_its_own_and_none_of_its_neighbour(tmp_pat
             assert np.ptp(values) > 0 or values == pytest.approx(5e3)
 
 
+def test_particles_of_weaker_softening_soil_have_the_field_divided_as_its_law_is(tmp_path):
+    """Its peak is a number of each point, which is that of the soil over the factor; half of the field for a factor of 2."""
+    layer = '[soils."layer 1"]\nmaterial = "softening"\nsoftening_strain = 0.1\nreference_length = 0.5\nresidual_cohesion = 1e3\n'
+    layer += "residual_friction_angle = 25.0\ncohesion = {value = 5e3, variation = 0.3, lengths = [8.0, 1.0]}"
+    site = read_site(site_in(tmp_path, "shear_strength = 20e3", layer), MPI.COMM_WORLD)
+    full, weak = (site.particles(3, bridge.reduced_strength(site.laws, factor)) for factor in (1.0, 2.0))
+    rows = np.isin(np.array(list(site.laws))[full.particles.material], site.tags_of(["layer 1"]))
+    assert np.ptp(full.parameter("cohesion")[rows]) > 1e3
+    assert weak.parameter("cohesion")[rows] == pytest.approx(0.5 * full.parameter("cohesion")[rows], rel=1e-12)
+
+
 def test_soil_that_does_not_vary_is_the_soil_without_a_field(tmp_path):
     factors = []
     for clay in (

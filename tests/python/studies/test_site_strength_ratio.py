@@ -13,6 +13,7 @@ from common.stage_runs import carry_out
 from mpi4py import MPI
 from test_site_k0 import STAGES, site_in, wet
 
+import fenics_bridge as bridge
 import mpm_core as mpm
 
 COMM = MPI.COMM_WORLD
@@ -202,3 +203,38 @@ def test_studies_without_these_stresses_refuse_it(tmp_path):
         mpm.InputError, match="--particles: .*site.toml has strength_ratio, but these particles begin without"
     ):
         study_main.main("safety", ["--site", site_in(tmp_path, SITE), "--particles", "--output", tmp_path / "out"])
+
+
+@pytest.mark.parametrize(
+    "material, residual",
+    [("softening", "residual_cohesion = 50.0\nsoftening_strain = 0.1\nreference_length = 0.5"), ("tresca", "")],
+)
+def test_soil_beside_a_wall_has_a_fraction_of_the_strength_of_the_ratio(tmp_path, material, residual):
+    """Half of 0.3 gamma' z at the points of cells beside the wall; laws other than softening ones divide what their points have themselves."""
+    soils = "".join(
+        f'[soils.{soil}]\nmaterial = "{material}"\nyoung = 8e6\npoisson = 0.45\nfriction_angle = 0\ndilation_angle = 0\n'
+        f"cohesion = 100.0\nstrength_ratio = 0.3\nk0 = 1.0\nunit_weight = 18e3\n{residual}\n"
+        for soil in ("ground", '"cut 1"', '"cut 2"', '"cut 3"')
+    )
+    braced = ROOT / "meshes" / "braced_excavation.toml"
+    path = tmp_path / "site.toml"
+    wall = "[members.wall]\ninterface_strength = 0.5\n"
+    stage = '[[stages]]\nname = "in situ"\nfill = ["ground", "cut 1", "cut 2", "cut 3"]\n[[stages]]\nname = "wall"\ninstall = ["wall"]\n'
+    path.write_text(f'extends = "{braced}"\ncell_size = 2.0\n{soils}{wall}{stage}')
+    site = read_site(path, COMM)
+    assert (
+        site.soils_with_strength_ratio == ["cut 1", "cut 2", "cut 3", "ground"]
+        or len(site.soils_with_strength_ratio) == 4
+    )
+    staged = bridge.FemSite(site.finite_elements(2))
+    for one in site.stages:
+        staged.carry_out(one)
+    fem = staged.fem
+    laws, tags = staged.fem.law_by_tag(), np.array(fem.soils)[np.repeat(fem.points.material, fem.points.per_cell)]
+    top = site.domain.geometry.x[:, 1].max()
+    full = np.maximum(0.3 * 18e3 * (top - fem.points.coordinates()[:, 1]), 100.0)
+    divided = np.array([getattr(laws[tag], "strength_factor", 1.0) for tag in tags])
+    share = fem.points.parameters["cohesion"] / divided / full
+    beside = np.abs(share - 0.5) < 1e-3
+    assert 0.01 < beside.mean() < 0.3
+    assert share[~beside] == pytest.approx(1.0, rel=1e-3)
