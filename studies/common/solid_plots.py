@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import LightSource, Normalize
+from matplotlib.colors import Colormap, LightSource, Normalize
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from particle_player import boundary_edges
@@ -43,6 +43,8 @@ CAPTIONS = {
     "mechanism": "Mechanism on the finest mesh: displacement of the last increment on the body, and its shear strain in the section along the black line",
     "stages_displacement": "The body after each stage, and its section along the black line, by the displacement",
     "stages_strain": "The body after each stage, and its section along the black line, by the strain accumulated since the displacements were reset",
+    **dict.fromkeys(("random_cohesion", "random_friction_angle"), "Strength of the soils that is a random field, on the body and in the section along the black line"),
+    "undrained_strength": "Undrained strength of the soils in which it follows the vertical effective stress, on the body and in the section along the black line",
     "slide_displacement": "Displacement at the end of the slide: all particles, and those of a section through the one that has moved most",
     "slide_strain": "Accumulated plastic shear strain at the end of the slide: all particles, and those of a section through the one that has moved most",
 }  # fmt: skip
@@ -117,6 +119,28 @@ def save_solid_stages(
         save_figure(figure, path)
 
 
+def save_solid_values(path: Path, solid: Solid, quantity: Quantity) -> None:
+    """Draw values of cells on the body and in a section.
+
+    Args:
+        path: of the picture.
+        solid: the body, whose strain has the values; cells in which they are NaN are left grey.
+        quantity: label, unit and colours.
+    """
+    section = main_section(solid)
+    values, colours = quantity.scale * solid.strain, plt.get_cmap(quantity.colours).with_extremes(bad="#dddddd")
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    norm = Normalize(low, high if high > low else low + 1.0)
+    with paper_style():
+        figure = plt.figure(figsize=(WIDTH, 3.6), layout="constrained")
+        body = figure.add_subplot(1, 2, 1, projection="3d")
+        draw_body(body, solid, values, norm, colours, section, solid.side_to_see())
+        axes = figure.add_subplot(1, 2, 2)
+        draw_section(axes, section, quantity.scale * section.strain, norm, colours)
+        draw_bar(figure, [body, axes], quantity, norm, "neither", shrink=0.5)
+        save_figure(figure, path)
+
+
 def main_section(solid: Solid) -> Section:
     """The section through the place that moves most, along the way it moves."""
     axis = solid.section_axis()
@@ -124,7 +148,13 @@ def main_section(solid: Solid) -> Section:
 
 
 def draw_body(
-    axes: Any, solid: Solid, values: np.ndarray, norm: Normalize, colours: str, section: Section, side: np.ndarray
+    axes: Any,
+    solid: Solid,
+    values: np.ndarray,
+    norm: Normalize,
+    colours: str | Colormap,
+    section: Section,
+    side: np.ndarray,
 ) -> None:
     """Draw the surface of a body from above.
 
@@ -133,7 +163,7 @@ def draw_body(
         solid: the body.
         values: of its points (n,) or cells (m,), in the unit that is shown.
         norm: of the colours.
-        colours: name of their map.
+        colours: their map, or its name.
         section: whose line on the surface is drawn.
         side: horizontal direction (2,) to the side from which it is seen.
     """
@@ -197,7 +227,7 @@ def set_view(axes: Any, points: np.ndarray, side: np.ndarray) -> None:
         axis.set_major_locator(plt.MaxNLocator(most))
 
 
-def draw_section(axes: Axes, section: Section, values: np.ndarray, norm: Normalize, colours: str) -> None:
+def draw_section(axes: Axes, section: Section, values: np.ndarray, norm: Normalize, colours: str | Colormap) -> None:
     """Draw a section by values of its points or triangles, in the unit that is shown, with its outline."""
     by_triangle = len(values) == len(section.triangles) != len(section.points)
     given = {"facecolors": values} if by_triangle else {"shading": "gouraud"}

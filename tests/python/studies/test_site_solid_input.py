@@ -121,6 +121,18 @@ def test_particles_find_the_factor_of_safety_of_a_body(tmp_path):
     assert CAPTIONS["mechanism"] in (tmp_path / "out" / "report.html").read_text()
 
 
+@pytest.mark.parametrize("strength, text, name", [
+    ("1e3", "strength_ratio = 0.25\nk0 = 1.0\n", "undrained_strength"),
+    ("{value = 50e3, variation = 0.3, lengths = [2.0, 2.0, 1.0]}", "", "random_cohesion"),
+])  # fmt: skip
+def test_strengths_of_a_body_that_vary_are_drawn(tmp_path, strength, text, name):
+    stage = '[[stages]]\nname = "in situ"\nfill = ["clay"]\n'
+    path = block(tmp_path, strength=strength, text=text + stage)
+    assert study_main.main("excavation", ["--site", path, "--no-compare", "--output", tmp_path / "out"]) == 0
+    assert (tmp_path / "out" / f"{name}.png").stat().st_size > 20_000
+    assert CAPTIONS[name] in (tmp_path / "out" / "report.html").read_text()
+
+
 @pytest.mark.parametrize("size", [(4.0, 4.0, 3.0), (1.0, 1.0, 4.0), (40.0, 6.0, 8.0), (6.0, 40.0, 8.0)])
 def test_labels_of_a_body_are_within_the_picture_and_apart_from_its_numbers(size):
     figure = plt.figure(figsize=(7.0, 3.6), layout="constrained")
