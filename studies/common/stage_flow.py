@@ -98,7 +98,7 @@ def with_steady_flow(
         geometry: of the site; None for a plane section.
 
     Raises:
-        InputError: a stage asks for it beside a water level, or without boundaries or soils for it.
+        InputError: a stage asks for it beside a water level, or without boundaries or soils for it, or in three dimensions.
     """
     rows = table.get("stages", [])
     if not any("steady_flow" in row for row in rows):
@@ -117,6 +117,10 @@ def with_steady_flow(
         members = {name: one for name, one in members.items() if name not in stage.remove} | stage.install
         boundary |= boundaries_of_stage(row, where)
         if _asks(row, where):
+            if mesh[0].topology.dim == 3:
+                raise mpm.InputError(
+                    f"{where}: steady_flow is true, but dimension is 3, expected a water_level: flow is computed in sections"
+                )
             soils = {soil: pores[soil] for soil in there if pores[soil] is not None}
             walls = {name: member for name, member in members.items() if member.impervious}
             if not boundary or not soils:

@@ -63,6 +63,15 @@ def test_members_of_a_section_in_a_body_are_refused_before_any_stage(tmp_path):
         read_site(block(tmp_path, text=bolt), COMM)
 
 
+def test_steady_flow_through_a_body_is_refused(tmp_path):
+    stage = '[[stages]]\nname = "in situ"\nfill = ["clay"]\nsteady_flow = true\n'
+    text = "conductivity = 1e-6\n[boundaries.top]\nhead = 3.0\n" + stage
+    with pytest.raises(
+        mpm.InputError, match=r"stages\[0\]: steady_flow is true, but dimension is 3, expected a water_level"
+    ):
+        read_site(block(tmp_path, text=text), COMM)
+
+
 def test_correlation_lengths_of_a_body_are_three_and_so_are_those_of_the_example(tmp_path):
     path = block(tmp_path, strength="{value = 50e3, variation = 0.3, lengths = [20.0, 2.0]}")
     with pytest.raises(mpm.InputError, match=r"along each of 3 axes \[m\], such as \[20.0, 20.0, 2.0\]"):
@@ -122,7 +131,7 @@ def test_particles_find_the_factor_of_safety_of_a_body(tmp_path):
 
 
 @pytest.mark.parametrize("strength, text, name", [
-    ("1e3", "strength_ratio = 0.25\nk0 = 1.0\n", "undrained_strength"),
+    ("50e3", "strength_ratio = 2.0\nk0 = 1.0\n", "undrained_strength"),
     ("{value = 50e3, variation = 0.3, lengths = [2.0, 2.0, 1.0]}", "", "random_cohesion"),
 ])  # fmt: skip
 def test_strengths_of_a_body_that_vary_are_drawn(tmp_path, strength, text, name):
