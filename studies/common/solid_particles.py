@@ -14,7 +14,7 @@ import mpm_core as mpm
 from .figures import save_figure
 from .movie import gathered
 from .plots import WIDTH, Quantity, colour_limits, discs, paper_style
-from .solid_plots import AXES, draw_bar, set_view
+from .solid_plots import AXES, draw_bar, set_view, thin_numbers
 from .solids import Solid
 
 
@@ -70,6 +70,7 @@ def save_solid_particles(path: Path, frame: Mapping[str, np.ndarray], key: str, 
             xlim=_span(points[:, kept[0]]),
             ylim=_span(points[:, 2]),
         )
+        thin_numbers(axes, points[:, kept])
         axes.set_title(f"Section at {AXES[axis][:3]} = {at:.3g} m", loc="left", fontsize=8)
         draw_bar(figure, [above, axes], quantity, norm, "max", shrink=0.5)
         save_figure(figure, path)

@@ -238,6 +238,14 @@ def draw_section(axes: Axes, section: Section, values: np.ndarray, norm: Normali
     axes.set(aspect="equal", xlabel=AXES[1 - section.axis], ylabel=AXES[2])
     axes.set_title(f"Section at {AXES[section.axis][:3]} = {section.at:.3g} m", loc="left", fontsize=8)
     axes.margins(0.03)
+    thin_numbers(axes, section.points)
+
+
+def thin_numbers(axes: Axes, points: np.ndarray) -> None:
+    """Fewer numbers below a section of points (n, 2) [m] that is narrower than it is high, where they would overlap."""
+    width, height = np.ptp(points, axis=0)
+    if width < height:
+        axes.xaxis.set_major_locator(plt.MaxNLocator(max(1, round(MOST_INTERVALS * width / height))))
 
 
 def _draw_cut(axes: Any, corners: np.ndarray, section: Section) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import study_main
 from common.site_file import read_site
-from common.solid_plots import CAPTIONS, set_view
+from common.solid_plots import CAPTIONS, set_view, thin_numbers
 from mpi4py import MPI
 
 import mpm_core as mpm
@@ -159,5 +159,17 @@ def test_labels_of_a_body_are_within_the_picture_and_apart_from_its_numbers(size
                 np.linalg.norm(np.array(middles) - (label.min + label.max) / 2, axis=1).min() > 10
             )  # pixels; a digit is 8 high
             assert len(numbers) <= 2 + 4 * length / max(size)
+    finally:
+        plt.close(figure)
+
+
+@pytest.mark.parametrize("width, most", [(1.0, 2), (4.0, 5), (40.0, None)])
+def test_numbers_below_a_narrow_section_are_few(width, most):
+    figure, axes = plt.subplots()
+    try:
+        axes.set(xlim=(0, width), ylim=(0, 4))
+        before = len(axes.get_xticks())
+        thin_numbers(axes, np.array([(0.0, 0.0), (width, 4.0001)]))
+        assert len(axes.get_xticks()) == before if most is None else len(axes.get_xticks()) <= most
     finally:
         plt.close(figure)
