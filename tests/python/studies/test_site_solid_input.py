@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import study_main
 from common.site_file import read_site
+from common.plots import DISPLACEMENT, colour_limits
 from common.solid_plots import CAPTIONS, set_view, thin_numbers
 from mpi4py import MPI
 
@@ -173,3 +174,7 @@ def test_numbers_below_a_narrow_section_are_few(width, most):
         assert len(axes.get_xticks()) == before if most is None else len(axes.get_xticks()) <= most
     finally:
         plt.close(figure)
+
+
+def test_the_scale_of_particles_that_have_not_moved_begins_at_zero():
+    assert colour_limits(DISPLACEMENT, [np.zeros(5)]) == (0.0, pytest.approx(1.0, abs=0.25))
