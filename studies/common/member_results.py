@@ -204,7 +204,9 @@ def save_axial_forces(path: Path, names: list[str], stages: list[StageForces]) -
     """Largest axial force of bars and struts after each stage, or of one stage alone as bars."""
     shown = [stage for stage in stages if stage.forces]
     if len(shown) == 1:
-        return _save_bars(path, {name: largest(shown[0].forces[name].axial_force) for name in names}, _dimension(stages))
+        return _save_bars(
+            path, {name: largest(shown[0].forces[name].axial_force) for name in names}, _dimension(stages)
+        )
     with curve_figure(path, (5.4, 3.4)) as axes:
         for k, name in enumerate(names):
             values = [1e-3 * largest(s.forces[name].axial_force) if name in s.forces else np.nan for s in shown]
