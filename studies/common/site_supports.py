@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,8 @@ def supports_of(table: dict, path: Path, domain: Any, facet_tags: Any) -> list[b
             f"{path} has no [supports], and the mesh has no boundary named {', '.join(DEFAULT_SUPPORTS)}; it has {list(names)}"
         )
     _warn_of_upright_base(path, domain, facet_tags)
+    if not table.get("supports"):
+        _warn_of_free_sides(path, domain, facet_tags, given)
     return [support_of(name, kind, f"{path}: supports.{name}", domain, facet_tags) for name, kind in given.items()]
 
 
@@ -47,6 +50,36 @@ def support_of(name: str, kind: str, where: str, domain: Any, facet_tags: Any) -
             f"{where}: a roller needs a boundary at right angles to an axis, expected 'fixed' for this one"
         )
     return bridge.roller(name, normal)
+
+
+def _warn_of_free_sides(path: Path, domain: Any, facet_tags: Any, held: Mapping[str, str]) -> None:
+    """Warn of boundaries at the sides of a mesh that have no support, since their names are none of the default ones. Collective.
+
+    Args:
+        path: of the file, which names no supports.
+        domain: the mesh.
+        facet_tags: tags of its boundaries.
+        held: supports by boundary.
+    """
+    dim, comm = domain.geometry.dim, domain.comm
+    x = domain.geometry.x
+    low, high = (reduce(comm.allgather(values), axis=0) for reduce, values in
+                 ((np.min, x.min(axis=0, initial=np.inf)), (np.max, x.max(axis=0, initial=-np.inf))))  # fmt: skip
+    free = []
+    for name in bridge.names_of(facet_tags):
+        normal = None if name in held else bridge.flat_normal(domain, facet_tags, name)
+        if normal is None or normal[-1]:
+            continue
+        axis = normal.index(1.0)
+        places = x[facet_nodes(domain, tagged_facets(comm, facet_tags, name, "supports"))][:, :, axis].ravel()
+        place = np.mean([one for one in comm.allgather(places.mean() if len(places) else None) if one is not None])
+        if min(abs(place - low[axis]), abs(place - high[axis])) < 1e-6 * (high[axis] - low[axis]):
+            free.append(name)
+    if free:
+        several = len(free) > 1
+        say(f"{path}: the boundar{'ies' if several else 'y'} {' and '.join(map(repr, free))} at the side{'s' if several else ''} of the mesh "
+            f"{'are' if several else 'is'} free, since without [supports] only {', '.join(DEFAULT_SUPPORTS)} are held: name {'them' if several else 'it'} "
+            "in [supports], or give [supports] without it where it is a free surface")  # fmt: skip
 
 
 def _warn_of_upright_base(path: Path, domain: Any, facet_tags: Any) -> None:

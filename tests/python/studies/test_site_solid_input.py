@@ -178,3 +178,24 @@ def test_numbers_below_a_narrow_section_are_few(width, most):
 
 def test_the_scale_of_particles_that_have_not_moved_begins_at_zero():
     assert colour_limits(DISPLACEMENT, [np.zeros(5)]) == (0.0, pytest.approx(1.0, abs=0.25))
+
+
+SECTION = """
+SetFactory("OpenCASCADE");
+Rectangle(1) = {{0, 0, 0, 4, 2}};
+Physical Surface("clay") = {{1}};
+Physical Curve("base") = {{1}}; Physical Curve("{right}") = {{2}}; Physical Curve("top") = {{3}}; Physical Curve("left") = {{4}};
+Mesh.MeshSizeMax = 1;
+"""
+
+
+@pytest.mark.parametrize("right, supports, free", [
+    ("east", "", True), ("right", "", False), ("east", '[supports]\nbase = "fixed"\n', False),
+])  # fmt: skip
+def test_a_side_that_no_default_support_holds_is_warned_of(tmp_path, recwarn, right, supports, free):
+    (tmp_path / "section.geo").write_text(SECTION.format(right=right))
+    soil = '[soils.clay]\nunit_weight = 18e3\nmaterial = "tresca"\nyoung = 5e6\npoisson = 0.4\nshear_strength = 20e3\n'
+    (tmp_path / "site.toml").write_text(f'mesh = "section.geo"\n{soil}{supports}')
+    read_site(tmp_path / "site.toml", COMM)
+    said = [str(one.message) for one in recwarn if "at the side of the mesh is free" in str(one.message)]
+    assert len(said) == free and all("the boundary 'east'" in text and "left, right, front" in text for text in said)
