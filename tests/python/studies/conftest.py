@@ -5,8 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from fenics_bridge.mesh import meshes
-
 NAMES_FILES_OR_COMMANDS = re.compile(rb"\b(?:Include|Merge\w*|Open|\w*System\w*|OnelabRun)\b")
 
 
@@ -20,6 +18,9 @@ def text_of(path):
 @pytest.fixture(scope="session", autouse=True)
 def meshes_are_read_once():
     """A process of gmsh takes a quarter of a second, and most tests of a file have their site on one mesh."""
+    # Not above: a process that hands tests out to others, which start mpirun, must not begin MPI itself.
+    from fenics_bridge.mesh import meshes
+
     known, read = {}, meshes.read_apart
 
     def read_or_known(path, dim, result, name, limits):
