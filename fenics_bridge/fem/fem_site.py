@@ -135,15 +135,14 @@ class FemSite:
         last = max((number for number, stage in enumerate(stages) if stage.strength_ratio), default=0)
         for stage in stages[:last]:
             self.carry_out(stage)
-        state = self.state
-        if stages[last].strength_ratio:
-            state, _, _ = state.after(stages[last])
-            self._begin(stages[last], state)
-            last += 1
-        for stage in stages[last:]:
+        state, rest, load = self.state, stages[last:], None
+        if rest[0].strength_ratio:
+            state, _, _ = state.after(rest[0])
+            load, rest = self._begin(rest[0], state), rest[1:]
+        for stage in rest:
             state, _, _ = state.after(stage)
         self.number = len(stages)
-        return self._enter(state)
+        return self._enter(state) if rest or load is None else load
 
     def largest_displacement(self) -> float:
         """Largest displacement of a node of the present soil, since displacements count [m]. Collective."""
@@ -199,7 +198,7 @@ class FemSite:
             if tag in self.state.there:
                 vertical = vertical_stress(law, present[rows], points.state[rows, : law.n_state])
             else:
-                vertical = -placed[rows, upward(placed)]
+                vertical = -placed[rows, upward(placed.shape[1])]
             found[rows] = strengths(laws[tag], ratio, vertical)
         return found
 
