@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 import mpm_core as mpm
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.loads import Load
+from fenics_bridge.fem.overconsolidation import upward
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.types import Law
 from mpm_core import _core
@@ -69,7 +70,7 @@ class GroundAtRest:
 
     def stiffness(self, size: int) -> NDArray[np.float64]:
         """Stiffness (S, S) [Pa]; size: 4 in two dimensions, 6 in three."""
-        vertical = 1 if size == 4 else 2
+        vertical = upward(size)
         horizontal = [axis for axis in range(3) if axis != vertical]
         nu, weight = self.poisson, np.zeros(size)
         shear = self.modulus * (1 - 2 * nu) / (2 * (1 - nu))

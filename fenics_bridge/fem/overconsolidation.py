@@ -69,7 +69,7 @@ def hardened(law: Law, stress: NDArray[np.float64], state: NDArray[np.float64], 
         State variables, shape (n, n_state).
     """
     soil, names, result = hardening_soil_in(law), law.state_names, state.copy()
-    effective, up = effective_stress(law, stress, state), upward(stress)
+    effective, up = effective_stress(law, stress, state), upward(stress.shape[1])
     level = np.zeros_like(stress)  # its largest principal stress is the vertical one, whatever K0 of the ground
     level[:, :3] = normal_k0(soil) * np.minimum(effective[:, up], 0.0)[:, None]
     level[:, up] = np.minimum(effective[:, up], 0.0)
@@ -94,9 +94,9 @@ def effective_stress(law: Law, stress: NDArray[np.float64], state: NDArray[np.fl
     return effective
 
 
-def upward(stress: NDArray[np.float64]) -> int:
-    """Component of the vertical stress in stresses of shape (n, S); the last axis of the space points up."""
-    return 1 if stress.shape[1] == 4 else 2
+def upward(size: int) -> int:
+    """The vertical component of stresses with a number of components, 4 in two dimensions and 6 in three; the last axis of the space points up."""
+    return 1 if size == 4 else 2
 
 
 def normal_k0(law: Any) -> float:

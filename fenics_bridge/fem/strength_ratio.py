@@ -101,7 +101,7 @@ def vertical_stress(law: Law, stress: NDArray[np.float64], state: NDArray[np.flo
         stress: stress [Pa], tension positive, shape (n, S); the last axis of the space points up.
         state: state variables, shape (n, n_state).
     """
-    return -effective_stress(law, stress, state)[:, upward(stress)]
+    return -effective_stress(law, stress, state)[:, upward(stress.shape[1])]
 
 
 def strengths(law: Law, ratio: StrengthRatio, vertical: NDArray[np.float64]) -> NDArray[np.float64]:

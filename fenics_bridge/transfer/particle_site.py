@@ -125,7 +125,7 @@ class ParticleSite:
             self._fill(tag, state.unit_weight[tag], stage)
         placed = {tag: self.rows_of(tag) & (model.particles.id >= first) for tag in at_rest}
         vertical |= {
-            tag: (np.sort(model.particles.id[placed[tag]]), -stress[:, upward(stress)])
+            tag: (np.sort(model.particles.id[placed[tag]]), -stress[:, upward(stress.shape[1])])
             for tag, stress in carried.items()
             if tag in weak
         }

@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 
 import fenics_bridge as bridge
 from fenics_bridge import compat
+from fenics_bridge.fem.strength_ratio import STRENGTH
 from particle_player import axis_labels
 
 from .figures import Pictures, save_figure
 from .plots import WIDTH, Quantity, paper_style
 from .site_file import Site
-from .site_strength import STRENGTH
 from .solid_plots import save_solid_values
 from .solids import cells_there, gathered_solid
 

@@ -26,15 +26,13 @@ from typing import TYPE_CHECKING, Any
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from fenics_bridge.fem.strength_ratio import STRENGTH
 
 from .site_fields import SoilField, varying
 from .site_laws import EXPONENT, OVERCONSOLIDATION, RATIO, has_ratio, law_at
 
 if TYPE_CHECKING:
     from .site_file import Site
-
-STRENGTH = "cohesion"
-"""Parameter of laws that is the strength"""
 
 
 def ratio_of(table: Mapping[str, Any], where: str) -> bridge.StrengthRatio | None:
