@@ -92,9 +92,8 @@ def _places(
     part, near = part[on], float(near[on].min())
     places = np.sort(part.ravel())
     places = places[np.concatenate([[True], np.diff(places) > near])]
-    lengths = np.unique(
-        np.round(np.sort(part, axis=1) / near), axis=0
-    )  # edges, each once, whichever cells and ranks have it
+    # Each edge once, whichever cells and ranks have it
+    lengths = np.unique(np.round(np.sort(part, axis=1) / near), axis=0)
     covered = abs(places[0]) <= near and abs(places[-1] - 1) <= near and len(lengths) >= len(places) - 1
     if not covered:
         return None

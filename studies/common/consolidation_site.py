@@ -298,9 +298,7 @@ def read_consolidation_site(
     warn_of_reservoirs(mesh[0], conditions.values(), path)
     given = {name: pressure_table(one, f"{path}: pressures.{name}") for name, one in table.get("pressures", {}).items()}
     placed = {soil: weight for soil, weight in site.unit_weight.items() if soil in stages[0].off}
-    warn_of_weight(
-        comm, bridge.Load(unit_weight=placed)
-    )  # of soil that is there from the beginning its equilibrium does
+    warn_of_weight(comm, bridge.Load(unit_weight=placed))  # that of the beginning is doubted with its equilibrium
     points = {name: _point(given, f"{path}: points.{name}") for name, given in table["points"].items()}
     search = PointSearch(mesh[0], np.array(list(points.values())).reshape(-1, 2))
     for name, found in zip(points, search.found):

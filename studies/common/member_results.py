@@ -52,13 +52,17 @@ class StageForces:
 
 def stage_forces(site: bridge.FemSite, name: str) -> StageForces:
     """The forces of all members of a site now. Collective."""
-    return StageForces(site.number, name, {each: site.fem.member_forces(each) for each in site.fem.members})
+    return StageForces(site.number, name, _forces(site.fem))
 
 
 def last_forces(fem: bridge.QuasiStatic, name: str) -> list[StageForces]:
     """The forces of all members of finite elements now, as those of one stage of that name; none without members. Collective."""
-    forces = {each: fem.member_forces(each) for each in fem.members}
-    return [StageForces(1, name, forces)] if forces else []
+    return [StageForces(1, name, _forces(fem))] if fem.members else []
+
+
+def _forces(fem: bridge.QuasiStatic) -> dict[str, mpm.MemberForces]:
+    """The forces of all members now, by name. Collective."""
+    return {each: fem.member_forces(each) for each in fem.members}
 
 
 def axial_column(member: str, dim: int = 2) -> str:

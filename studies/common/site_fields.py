@@ -139,9 +139,8 @@ def values_of(
     for field in fields:
         rows = np.flatnonzero(np.isin(tags, tags_of([field.soil])))
         values[field.parameter][rows] = field(positions[rows])
-        for tag in tags_of(
-            [field.soil]
-        ):  # the peak of softening soil is a number of the law, which has been divided with it
+        # The peak of softening soil is a number of the law, which has been divided with it.
+        for tag in tags_of([field.soil]):
             if field.nominal > 0 and tag in laws and has_varying(laws[tag], field.parameter):
                 values[field.parameter][tags == tag] *= nominal_value(laws[tag], field.parameter) / field.nominal
     return values

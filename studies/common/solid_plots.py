@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +57,16 @@ def captions_for(captions: Mapping[str, str], dimension: int) -> dict[str, str]:
     return dict(captions) | (CAPTIONS if dimension == 3 else {})
 
 
+@dataclass
+class Shown:
+    """Values in colours: by_cell: whether they are of cells, else of points; norm: of the colours; colours: their map, or its name."""
+
+    values: np.ndarray
+    by_cell: bool
+    norm: Normalize
+    colours: str | Colormap
+
+
 def save_solid_mechanism(path: Path, solid: Solid, title: str) -> None:
     """Draw a displacement increment: its length on the body, and its deviatoric strain in a section, both relative.
 
@@ -65,22 +76,15 @@ def save_solid_mechanism(path: Path, solid: Solid, title: str) -> None:
         title: above the body.
     """
     section = main_section(solid)
-    top = float(np.quantile(section.strain, 0.98)) or 1.0
+    top = float(np.quantile(section.values, 0.98)) or 1.0
     with paper_style():
         figure = plt.figure(figsize=(WIDTH, 3.6), layout="constrained")
         body = figure.add_subplot(1, 2, 1, projection="3d")
-        draw_body(
-            body,
-            solid,
-            solid.lengths() / solid.lengths().max(),
-            Normalize(0, 1),
-            INCREMENT.colours,
-            section,
-            solid.side_to_see(),
-        )
+        moved = Shown(solid.lengths() / solid.lengths().max(), False, Normalize(0, 1), INCREMENT.colours)
+        draw_body(body, solid, moved, section, solid.side_to_see())
         body.set_title(title, loc="left", pad=0)
         axes = figure.add_subplot(1, 2, 2)
-        draw_section(axes, section, section.strain / top, Normalize(0, 1), INCREMENT_SHEAR.colours)
+        draw_section(axes, section, Shown(section.values / top, True, Normalize(0, 1), INCREMENT_SHEAR.colours))
         for below, quantity, extend in ((body, INCREMENT, "neither"), (axes, INCREMENT_SHEAR, "max")):
             draw_bar(figure, below, quantity, Normalize(0, 1), extend)
         save_figure(figure, path)
@@ -101,19 +105,19 @@ def save_solid_stages(
     most = max(solids, key=lambda one: one.lengths().max())
     axis, side = most.section_axis(), most.side_to_see()
     at = float(most.place_that_moves_most()[axis])
-    shown = [quantity.scale * (one.strain if by_cell else one.lengths()) for one in solids]
+    shown = [quantity.scale * (one.values if by_cell else one.lengths()) for one in solids]
     norm = Normalize(0.0, max(float(np.quantile(values, 0.995)) for values in shown) or 1.0)
     with paper_style():
         figure = plt.figure(figsize=(WIDTH, 2.7 * len(solids) + 0.6), layout="constrained")
         panels = []
         for row, (name, solid, values) in enumerate(zip(names, solids, shown)):
             section = section_of(solid, axis, at)
-            of_section = quantity.scale * (section.strain if by_cell else section.lengths)
+            of_section = quantity.scale * (section.values if by_cell else section.lengths)
             body = figure.add_subplot(len(solids), 2, 2 * row + 1, projection="3d")
-            draw_body(body, solid, values, norm, quantity.colours, section, side)
+            draw_body(body, solid, Shown(values, by_cell, norm, quantity.colours), section, side)
             body.set_title(f"Stage: {name}", loc="left", pad=0)
             axes = figure.add_subplot(len(solids), 2, 2 * row + 2)
-            draw_section(axes, section, of_section, norm, quantity.colours)
+            draw_section(axes, section, Shown(of_section, by_cell, norm, quantity.colours))
             panels += [body, axes]
         draw_bar(figure, panels, quantity, norm, "max", shrink=0.5)
         save_figure(figure, path)
@@ -124,19 +128,19 @@ def save_solid_values(path: Path, solid: Solid, quantity: Quantity) -> None:
 
     Args:
         path: of the picture.
-        solid: the body, whose strain has the values; cells in which they are NaN are left grey.
+        solid: the body with the values; cells in which they are NaN are left grey.
         quantity: label, unit and colours.
     """
     section = main_section(solid)
-    values, colours = quantity.scale * solid.strain, plt.get_cmap(quantity.colours).with_extremes(bad="#dddddd")
+    values, colours = quantity.scale * solid.values, plt.get_cmap(quantity.colours).with_extremes(bad="#dddddd")
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     norm = Normalize(low, high if high > low else low + 1.0)
     with paper_style():
         figure = plt.figure(figsize=(WIDTH, 3.6), layout="constrained")
         body = figure.add_subplot(1, 2, 1, projection="3d")
-        draw_body(body, solid, values, norm, colours, section, solid.side_to_see())
+        draw_body(body, solid, Shown(values, True, norm, colours), section, solid.side_to_see())
         axes = figure.add_subplot(1, 2, 2)
-        draw_section(axes, section, quantity.scale * section.strain, norm, colours)
+        draw_section(axes, section, Shown(quantity.scale * section.values, True, norm, colours))
         draw_bar(figure, [body, axes], quantity, norm, "neither", shrink=0.5)
         save_figure(figure, path)
 
@@ -147,23 +151,13 @@ def main_section(solid: Solid) -> Section:
     return section_of(solid, axis, float(solid.place_that_moves_most()[axis]))
 
 
-def draw_body(
-    axes: Any,
-    solid: Solid,
-    values: np.ndarray,
-    norm: Normalize,
-    colours: str | Colormap,
-    section: Section,
-    side: np.ndarray,
-) -> None:
+def draw_body(axes: Any, solid: Solid, shown: Shown, section: Section, side: np.ndarray) -> None:
     """Draw the surface of a body from above.
 
     Args:
         axes: in three dimensions.
         solid: the body.
-        values: of its points (n,) or cells (m,), in the unit that is shown.
-        norm: of the colours.
-        colours: their map, or its name.
+        shown: values of its points or cells.
         section: whose line on the surface is drawn.
         side: horizontal direction (2,) to the side from which it is seen.
     """
@@ -172,8 +166,8 @@ def draw_body(
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     light = AMBIENT + (1 - AMBIENT) * np.clip(normal @ LIGHT, 0.0, 1.0)
-    of_face = values[behind] if len(values) == len(solid.cells) != len(solid.points) else values[triangles].mean(axis=1)
-    rgba = plt.get_cmap(colours)(norm(of_face))
+    of_face = shown.values[behind] if shown.by_cell else shown.values[triangles].mean(axis=1)
+    rgba = plt.get_cmap(shown.colours)(shown.norm(of_face))
     rgba[:, :3] *= light[:, None]
     axes.add_collection3d(Poly3DCollection(corners, facecolors=rgba, edgecolors=rgba, linewidths=0.2, rasterized=True))
     ridges = solid.points[sharp_edges(triangles, normal, eye(side))]
@@ -227,12 +221,11 @@ def set_view(axes: Any, points: np.ndarray, side: np.ndarray) -> None:
         axis.set_major_locator(plt.MaxNLocator(most))
 
 
-def draw_section(axes: Axes, section: Section, values: np.ndarray, norm: Normalize, colours: str | Colormap) -> None:
-    """Draw a section by values of its points or triangles, in the unit that is shown, with its outline."""
-    by_triangle = len(values) == len(section.triangles) != len(section.points)
-    given = {"facecolors": values} if by_triangle else {"shading": "gouraud"}
-    axes.tripcolor(*section.points.T, section.triangles, *(() if by_triangle else (values,)), cmap=colours, norm=norm, rasterized=True,
-                   **given)  # fmt: skip
+def draw_section(axes: Axes, section: Section, shown: Shown) -> None:
+    """Draw a section by values of its points or triangles, with its outline."""
+    given: dict[str, Any] = {"facecolors": shown.values} if shown.by_cell else {"shading": "gouraud"}
+    axes.tripcolor(*section.points.T, section.triangles, *(() if shown.by_cell else (shown.values,)), cmap=shown.colours, norm=shown.norm,
+                   rasterized=True, **given)  # fmt: skip
     outline = section.points[boundary_edges(section.triangles)]
     axes.add_collection(LineCollection(outline, colors="black", linewidths=0.8))
     axes.set(aspect="equal", xlabel=AXES[1 - section.axis], ylabel=AXES[2])

@@ -13,7 +13,7 @@ import fenics_bridge as bridge
 
 from .figures import Pictures
 from .solid_plots import save_solid_stages
-from .solids import Solid, cells_there, gathered_solid
+from .solids import Solid, gathered_solid
 from .stage_plots import MOVED, SHEAR, first_shown, movement_picture, own_cell_values
 
 
@@ -31,8 +31,8 @@ class SolidStage:
 
 def solid_stage(site: bridge.FemSite, name: str) -> SolidStage | None:
     """The site as it is now; None but on the first rank. Collective."""
-    strain = own_cell_values(site.fem)[1][:, 0]
-    found = gathered_solid(site.fem.displacement, strain, cells_there(site.fem))
+    material, strain, _ = (values[:, 0] for values in own_cell_values(site.fem))
+    found = gathered_solid(site.fem.displacement, strain, material >= 0)
     return None if found is None else SolidStage(name, *found)
 
 
@@ -43,8 +43,8 @@ def solid_stage_pictures(
     if not pictures:
         return {}
     first = first_shown(stages, rows)
-    before = pictures[first - 1].solid.strain if first else 0.0
-    shown = [replace(one.solid, strain=one.solid.strain - before).part(one.there) for one in pictures[first:]]
+    before = pictures[first - 1].solid.values if first else 0.0
+    shown = [replace(one.solid, values=one.solid.values - before).part(one.there) for one in pictures[first:]]
     names = [row["stage"] for row in rows[first:]]
 
     def save(name: str, quantity: Any, by_cell: bool) -> None:

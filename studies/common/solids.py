@@ -23,18 +23,18 @@ INSIDE = 1e-3
 class Solid:
     """A displacement and a quantity of cells on tetrahedra, on the first rank.
 
-    points: (n, 3) [m]; cells: (m, 4) rows of points; moved: displacement (n, 3) [m]; strain: of each cell (m,) [-]
+    points: (n, 3) [m]; cells: (m, 4) rows of points; moved: displacement (n, 3) [m]; values: of the cells (m,), such as a strain [-]
     """
 
     points: np.ndarray
     cells: np.ndarray
     moved: np.ndarray
-    strain: np.ndarray
+    values: np.ndarray
 
     def part(self, there: np.ndarray) -> Solid:
         """The solid of some of its cells; there: whether each of them is one (m,)."""
         kept, number = np.unique(self.cells[there], return_inverse=True)
-        return Solid(self.points[kept], number.reshape(-1, 4), self.moved[kept], self.strain[there])
+        return Solid(self.points[kept], number.reshape(-1, 4), self.moved[kept], self.values[there])
 
     def lengths(self) -> np.ndarray:
         """Length of the displacement of each point: (n,)."""
@@ -84,23 +84,23 @@ class Section:
     """A plane section through a solid.
 
     points: (n, 2) [m], horizontal and vertical; triangles: (k, 3) rows of points; lengths: of the displacement at points (n,) [m]
-    strain: of the triangles (k,) [-]; axis: at right angles to it, 0 or 1; at: where it is on this axis [m]
+    values: of the triangles (k,), those of the cells in which they are; axis: at right angles to it, 0 or 1; at: where it is on this axis [m]
     """
 
     points: np.ndarray
     triangles: np.ndarray
     lengths: np.ndarray
-    strain: np.ndarray
+    values: np.ndarray
     axis: int
     at: float
 
 
-def gathered_solid(function: Any, strain: np.ndarray, there: np.ndarray) -> tuple[Solid, np.ndarray] | None:
+def gathered_solid(function: Any, values: np.ndarray, there: np.ndarray) -> tuple[Solid, np.ndarray] | None:
     """A displacement of DOLFINx at the corners of all tetrahedra, and whether each is there; None but on the first rank. Collective.
 
     Args:
         function: the displacement.
-        strain: of the cells that this rank owns, in the order of the mesh (m,) [-].
+        values: of the cells that this rank owns, in the order of the mesh (m,).
         there: whether each of these cells is there (m,).
     """
     domain = function.function_space.mesh
@@ -108,12 +108,12 @@ def gathered_solid(function: Any, strain: np.ndarray, there: np.ndarray) -> tupl
     own = mesh["cells"][mesh["cell_owners"] == comm.rank]
     corners = mesh["points"][own]
     moved, names = within_cells(function, corners), mesh["global_nodes"][own]
-    parts = comm.gather((corners, moved, names, strain, there))
+    parts = comm.gather((corners, moved, names, values, there))
     if parts is None:
         return None
-    corners, moved, names, strain, there = (np.concatenate(arrays) for arrays in zip(*parts))
+    corners, moved, names, values, there = (np.concatenate(arrays) for arrays in zip(*parts))
     _, first, number = np.unique(names, return_index=True, return_inverse=True)
-    return Solid(corners.reshape(-1, 3)[first], number.reshape(-1, 4), moved.reshape(-1, 3)[first], strain), there
+    return Solid(corners.reshape(-1, 3)[first], number.reshape(-1, 4), moved.reshape(-1, 3)[first], values), there
 
 
 def solid_mechanism(model: bridge.QuasiStatic, mechanism: Any) -> Solid | None:
@@ -174,10 +174,8 @@ def section_of(solid: Solid, axis: int, at: float) -> Section:
         corners = number[rows][crossed[rows]].reshape(-1, count)
         triangles.append(corners[:, :3])
         cells.append(cut[rows])
-        if (
-            count == 4
-        ):  # edges of opposite ends: the first and the last of them have no corner of the tetrahedron in common
+        if count == 4:  # the first and the last of these edges have no corner of the tetrahedron in common
             triangles.append(corners[:, 1:])
             cells.append(cut[rows])
     kept = [k for k in range(3) if k != axis]
-    return Section(points[:, kept], np.concatenate(triangles), lengths, solid.strain[np.concatenate(cells)], axis, at)
+    return Section(points[:, kept], np.concatenate(triangles), lengths, solid.values[np.concatenate(cells)], axis, at)

@@ -64,7 +64,7 @@ def test_a_section_has_the_area_of_the_body_and_its_linear_displacement(axis, at
 
 def test_a_part_of_a_solid_has_its_own_points():
     part = cube().part(np.array([True, False, False, False, False, False]))
-    assert len(part.points) == 4 and part.cells.shape == (1, 4) and part.strain == pytest.approx([0.0])
+    assert len(part.points) == 4 and part.cells.shape == (1, 4) and part.values == pytest.approx([0.0])
     assert part.moved[:, 0] == pytest.approx(part.points[:, 0] + 2 * part.points[:, 2])
 
 
