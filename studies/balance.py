@@ -20,7 +20,7 @@ from common.plots import Quantity, save_history
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
-from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options
+from common.slope.case import SlopeCase, add_slope_options, build_slope, check_slope_options
 from common.summary import write_summary
 from mpi4py import MPI
 

@@ -23,7 +23,6 @@ from common.body_runs import BodyRun, follow, mean_force
 from common.checkpoint import check_restart
 from common.checks import check_cells, check_effect, check_whole, say
 from common.figures import Pictures, curve_figure
-from common.flow_impact import bore
 from common.front import front
 from common.history import History
 from common.movie import QUANTITIES, WET_QUANTITIES, particle_movie
@@ -31,6 +30,7 @@ from common.options import add_number, check, study_parser
 from common.plots import CURVES, WATER_PRESSURE, Scene, save_particles
 from common.ranks import run_study
 from common.results import open_results
+from common.runout.impact import bore
 from common.scenes import scene_of
 from mpi4py import MPI
 from mpm_core.input_warnings import in_radians

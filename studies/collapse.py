@@ -19,10 +19,10 @@ from common.options import check, study_parser
 from common.page import Page
 from common.ranks import run_study
 from common.results import open_results
-from common.site_file import Site
-from common.site_runs import add_site_option, check_site_options, site_study
-from common.site_strength import refuse_strength_ratio
-from common.slope_fem import (
+from common.site.file import Site
+from common.site.runs import add_site_option, check_site_options, site_study
+from common.site.strength import refuse_strength_ratio
+from common.slope.fem import (
     add_fem_slope_options,
     add_ground_option,
     check_fem_slope_options,

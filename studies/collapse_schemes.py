@@ -17,8 +17,8 @@ from common.page import Page
 from common.ranks import run_study
 from common.results import open_results
 from common.schemes import add_particles_per_cell
-from common.slope_case import GRAVITY, soil_of
-from common.slope_fem import add_fem_slope_options, check_fem_slope_options, mesh_sizes, slope_fem, step_line, weight
+from common.slope.case import GRAVITY, soil_of
+from common.slope.fem import add_fem_slope_options, check_fem_slope_options, mesh_sizes, slope_fem, step_line, weight
 from common.summary import write_summary
 from mpi4py import MPI
 

@@ -24,7 +24,7 @@ from common.plots import Quantity
 from common.ranks import run_study
 from common.results import open_results
 from common.schemes import add_particles_per_cell
-from common.slope_case import (
+from common.slope.case import (
     GRAVITY,
     SUPPORTS,
     SlopeCase,
@@ -35,7 +35,7 @@ from common.slope_case import (
     slope_options,
     soil_of,
 )
-from common.slope_fem import mesh_sizes, step_line, weight
+from common.slope.fem import mesh_sizes, step_line, weight
 from common.summary import write_summary
 from mpi4py import MPI
 

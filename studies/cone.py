@@ -30,7 +30,7 @@ from common.quiet import GATHERS, without_warning
 from common.ranks import run_study
 from common.results import ROOT, open_results
 from common.scenes import scene_of
-from common.site_laws import unit_doubt
+from common.site.laws import unit_doubt
 from mpi4py import MPI
 
 import fenics_bridge as bridge

@@ -17,9 +17,9 @@ from time import perf_counter
 
 import numpy as np
 from common.checks import say
-from common.consolidation_members import MembersOverTime
-from common.consolidation_particles import ParticleGround, near_line
-from common.consolidation_plots import (
+from common.consolidation.members import MembersOverTime
+from common.consolidation.particles import ParticleGround, near_line
+from common.consolidation.plots import (
     EXCESS,
     ExcessPicture,
     save_excess,
@@ -27,14 +27,11 @@ from common.consolidation_plots import (
     save_isochrones,
     save_over_time,
 )
-from common.consolidation_site import ConsolidationSite, read_consolidation_site
-from common.consolidation_stages import pressures_of
-from common.discharge import extent_of
+from common.consolidation.site import ConsolidationSite, read_consolidation_site
+from common.consolidation.stages import pressures_of
 from common.field_files import FieldFiles
 from common.field_plots import Field, gathered
 from common.figures import Pictures
-from common.flow_doubts import warn_of_later_changes
-from common.member_results import captions
 from common.movie import PORE, particle_movie
 from common.options import add_count, add_flag, add_number, add_switch, study_parser
 from common.page import Page
@@ -43,9 +40,12 @@ from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
 from common.schemes import add_particles_per_cell
-from common.site_options import add_site_file
+from common.site.flow_doubts import warn_of_later_changes
+from common.site.member_results import captions
+from common.site.options import add_site_file
 from common.summary import write_summary
-from common.water_site import DAY, time_in_words
+from common.water.discharge import extent_of
+from common.water.site import DAY, time_in_words
 from dolfinx import fem
 from mpi4py import MPI
 

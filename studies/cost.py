@@ -27,7 +27,7 @@ from common.page import Page
 from common.plots import CURVES, WIDTH, paper_style
 from common.ranks import run_study
 from common.results import open_results
-from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options, solved_fem
+from common.slope.case import SlopeCase, add_slope_options, build_slope, check_slope_options, solved_fem
 from common.summary import write_summary
 from mpi4py import MPI
 

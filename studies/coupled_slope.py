@@ -27,7 +27,7 @@ from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
 from common.schemes import add_particles_per_cell
-from common.slope_case import GRAVITY, add_soil_options, soil_of
+from common.slope.case import GRAVITY, add_soil_options, soil_of
 from common.summary import write_summary
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize

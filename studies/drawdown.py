@@ -14,11 +14,11 @@ from argparse import ArgumentParser, Namespace
 import numpy as np
 from common.options import study_parser
 from common.ranks import run_study
-from common.slope_site import SlopeSite
-from common.water_site import DAY
-from common.water_slides import add_optional_slide
-from common.water_slope_runs import water_slope_study
-from common.water_slopes import add_water_slope_options, safety, steady_safety
+from common.slope.site import SlopeSite
+from common.water.runs import water_slope_study
+from common.water.site import DAY
+from common.water.slides import add_optional_slide
+from common.water.slopes import add_water_slope_options, safety, steady_safety
 
 import fenics_bridge as bridge
 from fenics_bridge import water

@@ -16,8 +16,12 @@ from pathlib import Path
 import numpy as np
 from common.animation import save_animation
 from common.checks import check_cells, check_two_cells, check_whole, say
-from common.earthquake_plots import save_amplification, save_ground, save_motions, save_record
-from common.earthquake_site import (
+from common.earthquake.motions import STEP, accelerations, ricker
+from common.earthquake.newmark import sliding_block, yield_acceleration
+from common.earthquake.options import add_motion_options, check_motion
+from common.earthquake.plots import save_amplification, save_ground, save_motions, save_record
+from common.earthquake.response import amplification, spectral_ratio
+from common.earthquake.site import (
     FIELDS,
     STIFF,
     band_of,
@@ -37,10 +41,7 @@ from common.figures import Pictures
 from common.followed import FollowedNodes, cells_near, mean_displacement, numbers_in
 from common.history import History
 from common.lengths import metres
-from common.motion_options import add_motion_options, check_motion
-from common.motions import STEP, accelerations, ricker
 from common.movie import gathered, own_frame, particle_movie
-from common.newmark import sliding_block, yield_acceleration
 from common.options import add_count, add_number, check, study_parser
 from common.output_options import add_picture_options
 from common.page import Page
@@ -50,9 +51,8 @@ from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
 from common.schemes import add_particles_per_cell
-from common.site_laws import unit_doubt
-from common.site_response import amplification, spectral_ratio
-from common.slope_case import GRAVITY, add_soil_options
+from common.site.laws import unit_doubt
+from common.slope.case import GRAVITY, add_soil_options
 from common.summary import write_summary
 from mpi4py import MPI
 from mpm_core.output import ModelOutput

@@ -21,7 +21,7 @@ from common.history import History
 from common.options import add_choice, add_count, add_number, check, study_parser
 from common.ranks import run_study
 from common.results import open_results
-from common.slope_case import add_soil_options
+from common.slope.case import add_soil_options
 from common.soils import add_law_options, check_law_options, law_of
 from common.summary import write_summary
 from mpm_core.law_warnings import angles_in_radians

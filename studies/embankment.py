@@ -15,23 +15,23 @@ from collections.abc import Callable
 from time import perf_counter
 
 import numpy as np
-from common import site_slides
 from common.checks import say
 from common.interrupt import Interrupt
 from common.lengths import metres
-from common.member_results import captions
 from common.movie import particle_movie
 from common.options import study_parser
 from common.page import Page
 from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
-from common.site_field_plots import CAPTIONS as STRENGTHS
-from common.site_field_plots import strength_pictures
-from common.site_file import Site, read_site
-from common.site_slides import add_strength_factor
-from common.solid_plots import captions_for
-from common.stage_runs import add_stage_options, carry_out
+from common.site import slides
+from common.site.field_plots import CAPTIONS as STRENGTHS
+from common.site.field_plots import strength_pictures
+from common.site.file import Site, read_site
+from common.site.member_results import captions
+from common.site.slides import add_strength_factor
+from common.solids.plots import captions_for
+from common.stages.runs import add_stage_options, carry_out
 from common.summary import write_summary
 from mpi4py import MPI
 
@@ -42,7 +42,7 @@ comm = MPI.COMM_WORLD
 CAPTIONS = {
     "stages_displacement": "The soil after each stage, by its displacement",
     "stages_strain": "The soil after each stage, by the strain accumulated since the displacements were reset",
-    "movements": "Largest movements after each stage", **site_slides.CAPTIONS, **STRENGTHS,
+    "movements": "Largest movements after each stage", **slides.CAPTIONS, **STRENGTHS,
 }  # fmt: skip
 
 
@@ -54,7 +54,7 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     add_stage_options(p, "embankment", "P1")
     add_strength_factor(p)
-    site_slides.add_slide_options(p, damping=0.01, pic=0.002)
+    slides.add_slide_options(p, damping=0.01, pic=0.002)
     return p
 
 
@@ -141,12 +141,12 @@ def main(arguments: list[str] | None = None) -> int:
     start = perf_counter()
     site = read_site(a.site, comm, a.cell_size, needed=("stages",))
     folder = open_results(a, comm)
-    degree, averaged = int(a.elements[1]), site_slides.averages(a, site.laws.values())
+    degree, averaged = int(a.elements[1]), slides.averages(a, site.laws.values())
     nmd = averaged and degree == 1
     run = carry_out(site, degree, folder, comm, nmd=nmd, as_particles=nmd and begins_from_elements(site))
     failed, rows = run.stopped, run.rows
     built = perf_counter()
-    particles, failed_particles = build(site, site_slides.particles_per_cell(a, site), a.factor, averaged, run.site)
+    particles, failed_particles = build(site, slides.particles_per_cell(a, site), a.factor, averaged, run.site)
     own_stages = not (failed or failed_particles or begins_from_elements(site))
     apart = stress_difference(particles, run.site) if own_stages else None
     model = particles.model
@@ -155,7 +155,7 @@ def main(arguments: list[str] | None = None) -> int:
     weaken(site, model, factor)
     scene = scene_of(model, sorted(site.laws))
     with Interrupt(comm) as interrupt:
-        result, stopped = site_slides.slide(a, model, folder, interrupt, pore_water(particles))
+        result, stopped = slides.slide(a, model, folder, interrupt, pore_water(particles))
     moved = result.history["largest_displacement_m"][-1]
     summary = {
         "finished_run": stopped is None, "stopped_because": stopped, "stage_without_equilibrium_fem": failed,
@@ -168,7 +168,7 @@ def main(arguments: list[str] | None = None) -> int:
     }  # fmt: skip
     drawn = {
         **(run.drawn(site.stages, folder) if a.pictures else {}),
-        **site_slides.slide_pictures(a, result, scene, folder),
+        **slides.slide_pictures(a, result, scene, folder),
         **(strength_pictures(site, run.site.fem, folder) if a.pictures else {}),
     }
     slide = f"strength divided by {factor:g}" if factor > 1 else "full strength"

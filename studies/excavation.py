@@ -12,18 +12,18 @@ from argparse import ArgumentParser, Namespace
 from time import perf_counter
 
 import numpy as np
-from common.member_results import captions
 from common.options import add_switch, study_parser
 from common.page import Page
 from common.quiet import NOT_REACHED, without_warning
 from common.ranks import run_study
 from common.results import open_results
-from common.site_field_plots import CAPTIONS as STRENGTHS
-from common.site_field_plots import strength_pictures
-from common.site_file import Site, read_site
-from common.solid_plots import captions_for
-from common.stage_flow import flow_lines
-from common.stage_runs import add_stage_options, carry_out
+from common.site.field_plots import CAPTIONS as STRENGTHS
+from common.site.field_plots import strength_pictures
+from common.site.file import Site, read_site
+from common.site.member_results import captions
+from common.solids.plots import captions_for
+from common.stages.flow import flow_lines
+from common.stages.runs import add_stage_options, carry_out
 from common.summary import write_summary
 from mpi4py import MPI
 

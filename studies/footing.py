@@ -18,9 +18,9 @@ from common.options import add_count, add_number, check, study_parser
 from common.page import Page
 from common.ranks import run_study
 from common.results import ROOT, open_results
-from common.site_laws import unit_doubt
-from common.slope_case import soil_of
-from common.slope_fem import add_element_options, finite_elements, step_line
+from common.site.laws import unit_doubt
+from common.slope.case import soil_of
+from common.slope.fem import add_element_options, finite_elements, step_line
 from common.summary import write_summary
 from mpi4py import MPI
 

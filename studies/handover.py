@@ -24,8 +24,8 @@ from common.plots import save_history
 from common.ranks import run_study
 from common.results import open_results
 from common.schemes import averages_strains
-from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
-from common.slope_fem import NO_COHESION, step_line, weight
+from common.slope.case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
+from common.slope.fem import NO_COHESION, step_line, weight
 from common.summary import write_summary
 from common.watch import Watch
 from mpi4py import MPI

@@ -16,16 +16,14 @@ from pathlib import Path
 import numpy as np
 from common.animation import save_animation
 from common.checks import check_cells, check_effect, check_two_cells, say
-from common.earthquake_plots import save_ground, save_record
-from common.earthquake_site import FIELDS, outcrop_motion
+from common.earthquake.motions import STEP, accelerations
+from common.earthquake.options import add_motion_options, check_motion
+from common.earthquake.plots import save_ground, save_record
+from common.earthquake.site import FIELDS, outcrop_motion
 from common.figures import Pictures
 from common.followed import cells_near, mean_displacement, numbers_in
 from common.history import History
 from common.lengths import metres
-from common.levee_plots import save_displacement, save_liquefaction
-from common.levee_site import SOILS, damping_of, effective_pressure, model_in_equilibrium, too_loose, void_ratio_named
-from common.motion_options import add_motion_options, check_motion
-from common.motions import STEP, accelerations
 from common.movie import gathered, own_frame, particle_movie
 from common.options import add_count, add_number, study_parser
 from common.output_options import add_picture_options
@@ -36,9 +34,18 @@ from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
 from common.schemes import add_particles_per_cell
-from common.site_laws import unit_doubt
-from common.slope_case import add_soil_options
+from common.site.laws import unit_doubt
+from common.slope.case import add_soil_options
 from common.summary import write_summary
+from common.water.levee_plots import save_displacement, save_liquefaction
+from common.water.levee_site import (
+    SOILS,
+    damping_of,
+    effective_pressure,
+    model_in_equilibrium,
+    too_loose,
+    void_ratio_named,
+)
 from mpi4py import MPI
 from mpm_core.output import ModelOutput
 

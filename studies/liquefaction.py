@@ -34,7 +34,7 @@ from common.ranks import run_study
 from common.results import open_results
 from common.scenes import scene_of
 from common.schemes import INTEGRATIONS
-from common.site_laws import unit_doubt
+from common.site.laws import unit_doubt
 from common.soils import add_parameter
 from mpi4py import MPI
 

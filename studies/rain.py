@@ -11,10 +11,10 @@ from argparse import ArgumentParser, Namespace
 
 from common.options import study_parser
 from common.ranks import run_study
-from common.slope_site import SlopeSite
-from common.water_slides import add_optional_slide
-from common.water_slope_runs import water_slope_study
-from common.water_slopes import add_water_slope_options, safety
+from common.slope.site import SlopeSite
+from common.water.runs import water_slope_study
+from common.water.slides import add_optional_slide
+from common.water.slopes import add_water_slope_options, safety
 
 import fenics_bridge as bridge
 from fenics_bridge import water

@@ -32,8 +32,8 @@ from common.quiet import NOT_REACHED, without_warning
 from common.ranks import run_study
 from common.results import open_results
 from common.schemes import add_pic
-from common.site_laws import unit_doubt
-from common.slope_case import SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
+from common.site.laws import unit_doubt
+from common.slope.case import SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
 from common.summary import write_summary
 from mpi4py import MPI
 

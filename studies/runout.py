@@ -28,14 +28,14 @@ from common.progress import Progress
 from common.quiet import without_warning
 from common.ranks import run_study
 from common.results import open_results
-from common.runout_endings import left_the_mesh, still_moving, too_fast
-from common.runout_ground import add_ground_options, check_ground, ground_strength
-from common.runout_places import Places, draw_places, read_places, results_at
-from common.runout_structures import Structure, add_structures, draw_forces, horizontal_force, read_structures
-from common.site_laws import unit_doubt
+from common.runout.endings import left_the_mesh, still_moving, too_fast
+from common.runout.ground import add_ground_options, check_ground, ground_strength
+from common.runout.places import Places, draw_places, read_places, results_at
+from common.runout.structures import Structure, add_structures, draw_forces, horizontal_force, read_structures
+from common.runout.terrain_plots import save_map
+from common.site.laws import unit_doubt
 from common.soils import add_law_options, check_law_options, law_of
 from common.summary import write_summary
-from common.terrain_plots import save_map
 from mpi4py import MPI
 from mpm_core.input_warnings import in_radians
 from mpm_core.output import ModelOutput

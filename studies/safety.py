@@ -23,12 +23,12 @@ from common.page import Page
 from common.quiet import NOT_REACHED, without_warning
 from common.ranks import run_study
 from common.results import open_results
-from common.site_file import Site
-from common.site_k0 import all_at_rest, begin_at_rest, say_left_out
-from common.site_runs import add_site_option, check_site_options, site_study
-from common.site_slides import IN_TETRAHEDRON
-from common.slope_case import GRAVITY, SUPPORTS, soil_of
-from common.slope_fem import (
+from common.site.file import Site
+from common.site.k0 import all_at_rest, begin_at_rest, say_left_out
+from common.site.runs import add_site_option, check_site_options, site_study
+from common.site.slides import IN_TETRAHEDRON
+from common.slope.case import GRAVITY, SUPPORTS, soil_of
+from common.slope.fem import (
     add_fem_slope_options,
     add_ground_option,
     check_fem_slope_options,

@@ -12,22 +12,22 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from common.discharge import exit_gradients, extent_of, in_words, inflow_column, inflows
 from common.field_files import FieldFiles
 from common.field_plots import save_curves
 from common.figures import Pictures
-from common.flow_doubts import warn_of_degree, warn_of_later_changes, warn_of_sealed_ground
-from common.flow_steps import FlowSteps
 from common.options import add_count, add_number, add_switch, study_parser
 from common.page import Page
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
-from common.seepage_plots import SATURATION, FlowPicture, dries, few, flow_picture, save_flow, save_flow_film
-from common.site_doubts import warn_of_suction
-from common.site_options import add_site_file
+from common.site.doubts import warn_of_suction
+from common.site.flow_doubts import warn_of_degree, warn_of_later_changes, warn_of_sealed_ground
+from common.site.options import add_site_file
 from common.summary import write_summary
-from common.water_site import DAY, WaterSite, read_water_site, time_in_words
+from common.water.discharge import exit_gradients, extent_of, in_words, inflow_column, inflows
+from common.water.seepage_plots import SATURATION, FlowPicture, dries, few, flow_picture, save_flow, save_flow_film
+from common.water.site import DAY, WaterSite, read_water_site, time_in_words
+from common.water.steps import FlowSteps
 from mpi4py import MPI
 
 from fenics_bridge import water

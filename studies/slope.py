@@ -39,11 +39,11 @@ from common.schemes import (
     run_scheme,
     stable_integration,
 )
-from common.site_laws import unit_doubt
-from common.site_runs import add_site_option, check_site_options
-from common.site_slides import add_strength_factor, site_slide
-from common.slope_case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, initialise
-from common.slope_results import drawn, page, print_summary, start_line, summarised
+from common.site.laws import unit_doubt
+from common.site.runs import add_site_option, check_site_options
+from common.site.slides import add_strength_factor, site_slide
+from common.slope.case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, initialise
+from common.slope.results import drawn, page, print_summary, start_line, summarised
 from common.soils import check_law_options, law_of
 from common.summary import write_summary
 from common.watch import Watch

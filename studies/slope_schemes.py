@@ -40,7 +40,7 @@ from common.quiet import LOCKS, without_warning
 from common.ranks import run_study
 from common.results import open_results
 from common.schemes import add_discretisation, add_pic, run_scheme
-from common.slope_case import add_slope_options, build_slope, check_slope_options, initialise
+from common.slope.case import add_slope_options, build_slope, check_slope_options, initialise
 from common.summary import write_summary
 from common.watch import Watch
 from matplotlib.colors import Normalize

@@ -30,15 +30,15 @@ from common.parameters import did_you_mean
 from common.progress import Progress
 from common.ranks import run_study
 from common.results import open_results
-from common.site_laws import law_units
+from common.site.laws import law_units
 from common.summary import write_summary
-from common.sweep_find import find as find_value
-from common.sweep_find import wanted_of
-from common.sweep_maps import hazard_maps
-from common.sweep_plan import Variable, correlation_of, number_of, plan, variable_of
-from common.sweep_plots import picture_of
-from common.sweep_results import drawn_results, ended_before, label, said, summarise, write_table
-from common.sweep_runs import Run, Study, carry_out, processors, require_names, runs_of, study_of, take_results
+from common.sweep.find import find as find_value
+from common.sweep.find import wanted_of
+from common.sweep.maps import hazard_maps
+from common.sweep.plan import Variable, correlation_of, number_of, plan, variable_of
+from common.sweep.plots import picture_of
+from common.sweep.results import drawn_results, ended_before, label, said, summarise, write_table
+from common.sweep.runs import Run, Study, carry_out, processors, require_names, runs_of, study_of, take_results
 from mpi4py import MPI
 
 from mpm_core import InputError

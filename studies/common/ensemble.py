@@ -16,7 +16,7 @@ from .figures import Pictures
 from .history import History
 from .plots import save_history
 from .schemes import run_scheme
-from .slope_case import GRAVITY, SlopeCase, build_slope, initialise
+from .slope.case import GRAVITY, SlopeCase, build_slope, initialise
 from .watch import Watch
 
 PERTURBATION = 1e-14

@@ -22,8 +22,8 @@ from particle_player import axis_labels, boundary_edges
 
 from .figures import curve_figure, save_figure
 from .plots import CURVES, MEMBER, ROUND_TICKS, WIDTH, Quantity, Scene, colour_limits, discs, paper_style
-from .soil_outlines import name_places, soil_outlines
-from .water_table import draw_water_table, top_with_water, water_legend
+from .site.outlines import name_places, soil_outlines
+from .site.water_table import draw_water_table, top_with_water, water_legend
 
 INCREMENT = Quantity("Displacement increment at collapse, relative", "-", colours="viridis")
 INCREMENT_SHEAR = Quantity("Shear strain increment at collapse, relative", "-", colours="inferno")

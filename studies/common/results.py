@@ -22,7 +22,7 @@ from mpm_core.collective import on_first_rank
 from .files import IN_SOURCES, NOT_WRITTEN, ROOT, OutputError, written_whole
 from .options import Options
 from .parameters import write_parameters
-from .site_tables import site_files
+from .site.tables import site_files
 
 MARK = ".talus-run"
 """The file that says which run writes, or wrote, to a folder. The run holds a lock on it, which ends with the process."""

@@ -13,9 +13,9 @@ from typing import Any
 import mpm_core as mpm
 
 from .checks import check_effect, say
-from .hardening_doubts import secant_doubt
 from .options import add_choice, add_code, add_number, add_switch
 from .parameters import did_you_mean
+from .site.hardening_doubts import secant_doubt
 
 MATERIALS = (
     "mohr-coulomb",

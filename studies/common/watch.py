@@ -6,7 +6,7 @@ import numpy as np
 from mpi4py import MPI
 
 from .movie import gathered, own_frame
-from .slope_case import SlopeCase
+from .slope.case import SlopeCase
 
 
 class Watch:

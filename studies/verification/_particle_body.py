@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from common.wet_particles import SmallMotion
+from common.water.wet_particles import SmallMotion
 from mpi4py import MPI
 
 import fenics_bridge as bridge

@@ -18,7 +18,7 @@ import numpy as np
 from _case import Check, Kind, Result
 from _particle_body import ParticleBody
 from _plots import save_comparison
-from common.consolidation_theory import (
+from common.consolidation.theory import (
     ball_pressure,
     layer_pressure,
     layer_settlement,

@@ -17,7 +17,7 @@ import numpy as np
 from _case import Check, Result
 from common.plots import save_history
 from common.schemes import IMPLICIT_STEP
-from common.slope_case import GRAVITY, build_slope, slope_options
+from common.slope.case import GRAVITY, build_slope, slope_options
 from common.watch import Watch
 from mpi4py import MPI
 

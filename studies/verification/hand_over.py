@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from _case import Check, Kind, Result
 from _plots import save_comparison
-from common.slope_case import GRAVITY, SUPPORTS, SlopeCase, build_slope, slope_options
+from common.slope.case import GRAVITY, SUPPORTS, SlopeCase, build_slope, slope_options
 from mpi4py import MPI
 
 import fenics_bridge as bridge

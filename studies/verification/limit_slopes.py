@@ -17,7 +17,7 @@ import numpy as np
 from _case import Check, Result
 from common.figures import curve_figure
 from common.plots import CURVES
-from common.slope_fem import slope_on_ground
+from common.slope.fem import slope_on_ground
 from mpi4py import MPI
 
 import fenics_bridge as bridge

@@ -13,8 +13,8 @@ they would change the pressure on the plane, so that a block that sticks creeps 
 import numpy as np
 from _case import Check, Result
 from _plots import save_comparison
-from common.motions import as_motion, band_limited_noise
-from common.newmark import pulse_slip, sliding_block
+from common.earthquake.motions import as_motion, band_limited_noise
+from common.earthquake.newmark import pulse_slip, sliding_block
 from mpi4py import MPI
 
 import fenics_bridge as bridge

@@ -29,7 +29,7 @@ from common.plots import (
     save_mesh,
     save_particles,
 )
-from common.slope_case import build_slope, slope_options
+from common.slope.case import build_slope, slope_options
 from common.watch import Watch
 from matplotlib import pyplot as plt
 from matplotlib.colors import Normalize

@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 from _case import Check, Result
 from _plots import save_comparison
-from common.slope_case import GRAVITY, SlopeCase, build_slope, slope_options
+from common.slope.case import GRAVITY, SlopeCase, build_slope, slope_options
 from common.watch import Watch
 from mpi4py import MPI
 

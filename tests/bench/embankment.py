@@ -22,7 +22,7 @@ import fenics_bridge as bridge
 TOP = Path(__file__).parents[2]
 sys.path.insert(0, str(TOP / "studies"))
 
-from common.site_file import site_of  # noqa: E402
+from common.site.file import site_of  # noqa: E402
 
 comm = MPI.COMM_WORLD
 SITE = TOP / "meshes" / "embankment.toml"

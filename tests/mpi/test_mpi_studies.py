@@ -19,7 +19,7 @@ import safety  # noqa: E402
 import slope  # noqa: E402
 import thick_cylinder  # noqa: E402
 from bridge_cases import slope_particles  # noqa: E402
-from common.slope_fem import slope_fem, weight  # noqa: E402
+from common.slope.fem import slope_fem, weight  # noqa: E402
 
 import fenics_bridge as bridge  # noqa: E402
 

@@ -73,7 +73,7 @@ def test_toml_blocks_are_parameters_of_the_study_that_the_page_runs_with_them(pa
         if "extends" in block:  # the file of a site, beside those that are shipped
             for shipped in (ROOT / "meshes").iterdir():
                 (tmp_path / shipped.name).symlink_to(shipped)
-            importlib.import_module("common.site_keys").read_site_table(file)
+            importlib.import_module("common.site.keys").read_site_table(file)
             continue
         study = re.search(rf"studies/run (\w+) --parameters {file.name}", page.read_text()).group(1)
         with pytest.raises(SystemExit) as ended:

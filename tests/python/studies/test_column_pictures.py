@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
 
 from common.field_plots import Field  # noqa: E402
 from common.figures import panel_figure  # noqa: E402
-from common.seepage_plots import HEAD, FlowPicture, _scales, save_flow  # noqa: E402
+from common.water.seepage_plots import HEAD, FlowPicture, _scales, save_flow  # noqa: E402
 
 
 def column(width, head):

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 from fenics_bridge.terrain import Raster
-from studies.common import figures, terrain_plots
+from studies.common import figures
 from studies.common.figures import FEW, curve_figure
-from studies.common.terrain_plots import hillshade
+from studies.common.runout import terrain_plots
+from studies.common.runout.terrain_plots import hillshade
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ from mpi4py import MPI
 
 import fenics_bridge as bridge
 from studies.common.field_plots import gathered, mechanism_field
-from studies.common.soil_outlines import soil_outlines
-from studies.common.stage_plots import StagePicture
+from studies.common.site.outlines import soil_outlines
+from studies.common.stages.plots import StagePicture
 
 
 def of_degree(degree):

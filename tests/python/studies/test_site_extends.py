@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 import study_main  # noqa: F401
-from common.site_keys import read_site_table
-from common.site_laws import idle_doubt, law_at
-from common.site_tables import MOST_FILES, site_files
+from common.site.keys import read_site_table
+from common.site.laws import idle_doubt, law_at
+from common.site.tables import MOST_FILES, site_files
 
 from mpm_core import InputError
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import study_main
-from common.site_field_plots import strength_pictures
-from common.site_file import read_site
+from common.site.field_plots import strength_pictures
+from common.site.file import read_site
 from mpi4py import MPI
 
 import fenics_bridge as bridge

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 import study_main  # noqa: F401
-from common.site_file import read_site
-from common.site_laws import law_at, unit_doubt
-from common.stage_runs import carry_out
+from common.site.file import read_site
+from common.site.laws import law_at, unit_doubt
+from common.stages.runs import carry_out
 from mpi4py import MPI
 
 import mpm_core as mpm

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 import study_main  # noqa: F401
-from common.site_file import read_site
-from common.site_interfaces import Interfaces, in_stages
+from common.site.file import read_site
+from common.site.interfaces import Interfaces, in_stages
 from mpi4py import MPI
 
 import fenics_bridge as bridge

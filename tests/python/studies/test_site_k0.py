@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import study_main  # noqa: F401
-from common.consolidation_site import read_consolidation_site
-from common.site_file import read_site
-from common.site_k0 import begin_at_rest
-from common.slope_site import read_slope_site
-from common.stage_runs import carry_out
+from common.consolidation.site import read_consolidation_site
+from common.site.file import read_site
+from common.site.k0 import begin_at_rest
+from common.slope.site import read_slope_site
+from common.stages.runs import carry_out
 from mpi4py import MPI
 
 import fenics_bridge as bridge

@@ -6,11 +6,11 @@ import re
 import numpy as np
 import pytest
 import study_main
-from common.consolidation_site import read_consolidation_site
-from common.hardening_doubts import k0_doubt, secant_at_half, secant_doubt
-from common.site_file import read_site
-from common.slope_site import read_slope_site
-from common.stage_runs import carry_out
+from common.consolidation.site import read_consolidation_site
+from common.site.file import read_site
+from common.site.hardening_doubts import k0_doubt, secant_at_half, secant_doubt
+from common.slope.site import read_slope_site
+from common.stages.runs import carry_out
 from hardening_soil_cases import hyperbola, preloaded, strength
 from mpi4py import MPI
 from test_site_hardening_soil import MESHES
@@ -124,7 +124,7 @@ def test_a_fill_settles_overconsolidated_ground_by_less(tmp_path):
 
 def test_particles_of_a_slide_take_it_over(tmp_path):
     """In the study slope, in which all soils are there at once."""
-    from common.site_slides import _carry_weight
+    from common.site.slides import _carry_weight
 
     path = site_in(tmp_path, SITE)
     site = read_site(path, COMM)

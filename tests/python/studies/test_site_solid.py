@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 import study_main
-from common.consolidation_site import read_consolidation_site
+from common.consolidation.site import read_consolidation_site
 from common.results import ROOT
-from common.site_file import read_site
-from common.solid_plots import sharp_edges
-from common.solids import Solid, section_of
-from common.water_site import read_water_table
+from common.site.file import read_site
+from common.solids.plots import sharp_edges
+from common.solids.site import Solid, section_of
+from common.water.site import read_water_table
 from mpi4py import MPI
 
 import mpm_core as mpm

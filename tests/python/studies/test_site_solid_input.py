@@ -8,9 +8,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import study_main
-from common.site_file import read_site
 from common.plots import DISPLACEMENT, colour_limits
-from common.solid_plots import CAPTIONS, set_view, thin_numbers
+from common.site.file import read_site
+from common.solids.plots import CAPTIONS, set_view, thin_numbers
 from mpi4py import MPI
 
 import mpm_core as mpm

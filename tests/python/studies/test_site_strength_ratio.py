@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 import study_main
-from common.consolidation_site import read_consolidation_site
+from common.consolidation.site import read_consolidation_site
 from common.results import ROOT
-from common.site_file import read_site
-from common.slope_site import read_slope_site
-from common.stage_runs import carry_out
+from common.site.file import read_site
+from common.slope.site import read_slope_site
+from common.stages.runs import carry_out
 from mpi4py import MPI
 from test_site_k0 import STAGES, site_in, wet
 

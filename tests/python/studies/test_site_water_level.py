@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import study_main  # noqa: F401
 from common.results import ROOT
-from common.site_doubts import top_of
-from common.site_file import read_site
+from common.site.doubts import top_of
+from common.site.file import read_site
 from mpi4py import MPI
 
 TRIANGLES = np.array([[(0, 0), (4, 0), (0, 2)], [(4, 0), (4, 1), (0, 2)], [(5, 0), (6, 0), (6, 3)]], dtype=float)

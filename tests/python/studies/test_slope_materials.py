@@ -13,7 +13,7 @@ from mpi4py import MPI
 sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
 
 from common.schemes import SCHEMES, run_scheme  # noqa: E402
-from common.slope_case import build_slope, initialise  # noqa: E402
+from common.slope.case import build_slope, initialise  # noqa: E402
 from common.soils import MATERIALS, law_of  # noqa: E402
 
 import mpm_core as mpm  # noqa: E402

@@ -12,7 +12,7 @@ import pytest
 STUDIES = Path(__file__).parents[3] / "studies"
 sys.path.insert(0, str(STUDIES))
 
-from common.flow_impact import bore  # noqa: E402
+from common.runout.impact import bore  # noqa: E402
 
 
 @pytest.mark.parametrize("froude", [1.0, 2.0, 6.0])

@@ -42,7 +42,7 @@ SITE = (STUDIES.parent / "meshes" / "fill.toml").read_text()
     ],
 )
 def test_a_wrong_site_is_named(old, new, words, tmp_path):
-    from common.consolidation_site import read_consolidation_site
+    from common.consolidation.site import read_consolidation_site
 
     from fenics_bridge import water
 
@@ -64,7 +64,7 @@ def test_a_wrong_site_is_named(old, new, words, tmp_path):
     ],
 )  # fmt: skip
 def test_values_that_are_probably_mistakes_are_said(old, new, words, tmp_path):
-    from common.consolidation_site import read_consolidation_site
+    from common.consolidation.site import read_consolidation_site
 
     assert old in SITE
     path = tmp_path / "site.toml"
@@ -93,7 +93,7 @@ RAMP = "footing = [[0.0, 0.0], [10.0, 20e3]]"
     ],
 )
 def test_ground_in_which_nothing_changes_is_known(old, new, days, changes, tmp_path):
-    from common.consolidation_site import read_consolidation_site
+    from common.consolidation.site import read_consolidation_site
 
     assert SITE.count(old) == 1 and SITE.count(RAMP) == 1
     still = SITE if old == RAMP else SITE.replace(RAMP, "footing = 0.0")
@@ -142,7 +142,7 @@ def test_ground_that_fails_right_after_a_frame_is_not_drawn_twice(tmp_path, monk
 )
 def test_steps_that_end_by_newtons_method_are_not_said_to_be_failure_of_the_ground(dilation, reason, doubted, tmp_path):
     import consolidation
-    from common.consolidation_site import read_consolidation_site
+    from common.consolidation.site import read_consolidation_site
 
     path, old = tmp_path / "site.toml", "friction_angle = 25.0"
     assert old in SITE
@@ -155,7 +155,7 @@ def test_steps_that_end_by_newtons_method_are_not_said_to_be_failure_of_the_grou
 
 
 def test_particles_take_no_other_water_than_reservoirs(tmp_path):
-    from common.consolidation_site import read_consolidation_site
+    from common.consolidation.site import read_consolidation_site
 
     from fenics_bridge import water
 
@@ -171,8 +171,8 @@ def test_particles_take_no_other_water_than_reservoirs(tmp_path):
 @pytest.mark.parametrize("nmd", [False, True])
 def test_particles_begin_at_rest(dilation, nmd, tmp_path):
     """Also in soil that does not dilate, of which elements and particles average strains and forces by half."""
-    from common.consolidation_site import read_consolidation_site
-    from common.wet_particles import SmallMotion
+    from common.consolidation.site import read_consolidation_site
+    from common.water.wet_particles import SmallMotion
 
     from fenics_bridge import water
 
@@ -298,7 +298,7 @@ def test_layers_that_are_placed_in_stages_settle_the_clay_below_as_their_weights
 
 @pytest.mark.parametrize("weight, said", [("20e3", False), ("20.0", True)])
 def test_a_unit_weight_of_soil_that_is_placed_later_is_looked_at_too(weight, said, tmp_path):
-    from common.consolidation_site import read_consolidation_site
+    from common.consolidation.site import read_consolidation_site
 
     _write_layer(tmp_path, (2.0, 2.2))
     fill = f"[soils.first]\nunit_weight = {weight}\nmaterial = 'elastic'\nyoung = 4e6\npoisson = 0.25\n"
@@ -334,7 +334,7 @@ def test_a_unit_weight_of_soil_that_is_placed_later_is_looked_at_too(weight, sai
     ],
 )
 def test_wrong_stages_are_named(stages, words, tmp_path):
-    from common.consolidation_site import read_consolidation_site
+    from common.consolidation.site import read_consolidation_site
 
     from fenics_bridge import water
 
@@ -360,7 +360,7 @@ def test_wrong_stages_are_named(stages, words, tmp_path):
     ],
 )
 def test_stages_that_particles_cannot_follow_are_named(change, stage, words, tmp_path):
-    from common.consolidation_site import read_consolidation_site
+    from common.consolidation.site import read_consolidation_site
 
     from fenics_bridge import water
 
@@ -383,7 +383,7 @@ def test_stages_that_particles_cannot_follow_are_named(change, stage, words, tmp
     ],
 )
 def test_wrong_pressures_on_the_command_line_are_named(word, words):
-    from common.consolidation_stages import pressures_of
+    from common.consolidation.stages import pressures_of
 
     with pytest.raises(InputError, match=words):
         pressures_of([word])
@@ -442,7 +442,7 @@ def test_a_load_that_goes_leaves_less_pressure_than_there_was(tmp_path):
 
 def test_the_pressure_between_smooth_plates_rises_as_mandel_says():
     """The pressure in the middle over half the load reaches 1.1555 at a time factor of 0.084 (Poisson ratio 0)."""
-    from common.consolidation_site import read_consolidation_site
+    from common.consolidation.site import read_consolidation_site
 
     from fenics_bridge import water
 

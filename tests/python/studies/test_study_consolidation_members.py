@@ -67,7 +67,7 @@ def site_in(folder, stages):
 
 
 def read(path):
-    from common.consolidation_site import read_consolidation_site
+    from common.consolidation.site import read_consolidation_site
 
     return read_consolidation_site(path, MPI.COMM_SELF)
 

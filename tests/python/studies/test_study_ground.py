@@ -9,7 +9,7 @@ sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
 
 import collapse  # noqa: E402
 import safety  # noqa: E402
-from common.slope_fem import outside_line  # noqa: E402
+from common.slope.fem import outside_line  # noqa: E402
 
 import fenics_bridge as bridge  # noqa: E402
 

@@ -79,13 +79,13 @@ def test_the_ground_settles_as_its_water_flows_off(of, tmp_path):
     ("largest", "times"), [(0.2, 10.0), (0.21, 5.0), (0.5, 2.0), (1.9, 1.0), (30.0, 1.0), (0.0, 1.0), (2e-3, 1000.0)]
 )
 def test_displacements_are_enlarged_to_a_thirtieth_of_the_width_at_most(largest, times):
-    plots = importlib.import_module("common.levee_plots")
+    plots = importlib.import_module("common.water.levee_plots")
     assert plots.enlargement(largest, 60.0) == pytest.approx(times)  # a thirtieth is 2 m
 
 
 def test_displacements_are_drawn_beside_the_outline_before(monkeypatch):
     """A block of 40 m by 10 m that moves as a whole by (0.3, -0.1) m: drawn four times as far, rounded down to twice as far."""
-    plots, figures = importlib.import_module("common.levee_plots"), []
+    plots, figures = importlib.import_module("common.water.levee_plots"), []
     monkeypatch.setattr(plots, "save_figure", lambda figure, path: figures.append(figure))
     x, y = np.meshgrid(np.linspace(0, 40, 11), np.linspace(-10, 0, 4))
     triangles = Triangulation(x.ravel(), y.ravel())
@@ -107,9 +107,9 @@ def test_displacements_are_drawn_beside_the_outline_before(monkeypatch):
 
 def test_the_levee_has_the_strength_of_its_options():
     options = "--cohesion 8e3 --friction-angle 30 --dilation-angle 4 --young 50e6 --poisson 0.25".split()
-    law = importlib.import_module("common.levee_site").laws_at_rest(importlib.import_module("levee").parse(options))[
-        "levee"
-    ]
+    law = importlib.import_module("common.water.levee_site").laws_at_rest(
+        importlib.import_module("levee").parse(options)
+    )["levee"]
     assert (law.cohesion, law.friction_angle, law.dilation_angle, law.young, law.poisson) == (
         8e3,
         30.0,
@@ -145,5 +145,5 @@ def test_sand_that_fails_under_its_load_names_its_void_ratio(void_ratio, tmp_pat
 
 
 def test_sand_that_can_have_strength_is_not_warned_of():
-    levee, site = importlib.import_module("levee"), importlib.import_module("common.levee_site")
+    levee, site = importlib.import_module("levee"), importlib.import_module("common.water.levee_site")
     assert site.too_loose(levee.parser().parse_args(["--void-ratio", "0.93"])) == ""

@@ -16,7 +16,7 @@ import mpm_core as mpm
 ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT / "studies"))
 SITE = (ROOT / "meshes" / "braced_excavation.toml").read_text()
-site_file = importlib.import_module("common.site_file")
+site_file = importlib.import_module("common.site.file")
 
 
 def site_in(folder, text=SITE):
@@ -199,7 +199,7 @@ def test_studies_of_drawdown_and_rain_say_that_they_leave_members_out(tmp_path):
     )
     (tmp_path / "bank_on_ground.geo").write_text((ROOT / "meshes" / "bank_on_ground.geo").read_text())
     (tmp_path / "dike.toml").write_text(text.replace("[[stages]]", member + "[[stages]]", 1))
-    read = importlib.import_module("common.slope_site").read_slope_site
+    read = importlib.import_module("common.slope.site").read_slope_site
     with pytest.warns(RuntimeWarning, match="the structural members 'wall' are left out here"):
         read(tmp_path / "dike.toml", MPI.COMM_WORLD, 3.0)
 

@@ -21,8 +21,9 @@ from mpm_core import failure_watch
 STUDIES = Path(__file__).parents[3] / "studies"
 sys.path.insert(0, str(STUDIES))
 
-from common import quiet, seepage_plots  # noqa: E402
+from common import quiet  # noqa: E402
 from common.option_words import in_options  # noqa: E402
+from common.water import seepage_plots  # noqa: E402
 
 
 def test_warnings_that_a_study_leaves_out_are_those_of_the_core():
@@ -42,7 +43,7 @@ def test_warnings_that_a_study_leaves_out_are_those_of_the_core():
 
 def test_round_off_of_an_inflow_is_nothing():
     inflows = {"upstream": 0.5, "downstream": -0.5, "crest": 1.9e-20}
-    discharge = importlib.import_module("common.discharge")
+    discharge = importlib.import_module("common.water.discharge")
     shown = discharge.in_words(inflows, discharge.PLANE)
     assert [text.split()[0] for text in shown.values()] == ["500", "-500", "0"]
     assert all(text.endswith("litres per metre and day") for text in shown.values())

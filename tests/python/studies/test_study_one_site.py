@@ -134,9 +134,9 @@ def ground_alone(folder, first_line=""):
 
 def reads():
     """Functions that read a site, by study."""
-    for study, module in (("safety", "site_file"), ("seepage", "water_site"), ("drawdown", "slope_site"),
-                          ("consolidation", "consolidation_site")):  # fmt: skip
-        reader = {"site_file": "read_site"}.get(module, f"read_{module}")
+    for study, module in (("safety", "site.file"), ("seepage", "water.site"), ("drawdown", "slope.site"),
+                          ("consolidation", "consolidation.site")):  # fmt: skip
+        reader = {"site.file": "read_site"}.get(module, f"read_{module.replace('.', '_')}")
         yield pytest.param(getattr(importlib.import_module(f"common.{module}"), reader), id=study)
 
 
@@ -153,7 +153,7 @@ def test_a_group_of_the_mesh_without_a_soil_is_named_unless_it_is_declared_as_ai
 
 
 def test_a_soil_that_no_stage_fills_is_named(tmp_path):
-    from common.site_file import read_site
+    from common.site.file import read_site
 
     text = written(tmp_path).read_text()
     stages = text.index("[[stages]]")
@@ -183,7 +183,7 @@ def test_a_soil_that_no_stage_fills_is_named(tmp_path):
     ],
 )
 def test_stiffness_and_strength_in_kilopascals_are_named(change, words, tmp_path):
-    from common.site_file import read_site
+    from common.site.file import read_site
 
     with pytest.warns(RuntimeWarning, match=words):
         read_site(written(tmp_path, change), MPI.COMM_WORLD, 3.0)
@@ -191,7 +191,7 @@ def test_stiffness_and_strength_in_kilopascals_are_named(change, words, tmp_path
 
 @pytest.mark.parametrize("table", ["soils.bank", "laws.weak"])
 def test_a_key_without_effect_on_the_law_is_named(table, tmp_path):
-    from common.site_file import read_site
+    from common.site.file import read_site
 
     change = "[soils.bank]", "[laws.weak]\nyoung = 5e6\n[soils.bank]\n"
     change = change[0], change[1].replace(f"[{table}]\n", f"[{table}]\nviscosity = 1e3\n")
@@ -200,8 +200,8 @@ def test_a_key_without_effect_on_the_law_is_named(table, tmp_path):
 
 
 def test_parameters_that_a_law_needs_and_a_soil_leaves_out_are_named_with_their_values(tmp_path):
-    from common.site_file import read_site
-    from common.site_laws import left_out_doubt
+    from common.site.file import read_site
+    from common.site.laws import left_out_doubt
 
     change = "[soils.bank]", "[laws.weak]\nyoung = 5e6\ncohesion = 2e3\n[soils.bank]"
     words = (
@@ -216,7 +216,7 @@ def test_parameters_that_a_law_needs_and_a_soil_leaves_out_are_named_with_their_
 
 
 def test_a_strength_that_is_small_at_the_top_only_is_not_named(tmp_path):
-    from common.site_file import read_site
+    from common.site.file import read_site
 
     change = "cohesion = 10e3  # Pa", "cohesion = {value = 0.0, per_metre = 2e3, top = 8.0}"
     with warnings.catch_warnings():
@@ -226,7 +226,7 @@ def test_a_strength_that_is_small_at_the_top_only_is_not_named(tmp_path):
 
 @pytest.mark.parametrize("given, words", [(2e7, 1), (5e-5, 1), (5e-8, 0)])
 def test_a_modulus_or_kilopascals_in_the_place_of_a_compressibility_are_named(given, words, tmp_path):
-    from common.water_site import read_water_site
+    from common.water.site import read_water_site
 
     change = "compressibility = 5e-8", f"compressibility = {given}"
     with warnings.catch_warnings(record=True) as said:
@@ -237,7 +237,7 @@ def test_a_modulus_or_kilopascals_in_the_place_of_a_compressibility_are_named(gi
 
 @pytest.mark.parametrize("modulus, words", [(2.2, 1), (2.2e9, 0)])
 def test_a_modulus_of_the_water_in_gigapascals_is_named(modulus, words, tmp_path):
-    from common.site_file import read_site
+    from common.site.file import read_site
 
     change = "[soils.bank]", f"[soils.bank]\nundrained = true\nwater_modulus = {modulus}"
     with warnings.catch_warnings(record=True) as said:
@@ -250,9 +250,9 @@ def test_a_modulus_of_the_water_in_gigapascals_is_named(modulus, words, tmp_path
 @pytest.mark.parametrize(
     "module, study, where",
     [
-        ("site_file", "read_site", r"stages\[2\]: water_level"),
-        ("slope_site", "read_slope_site", "the reservoir of 'face'"),
-        ("water_site", "read_water_site", "the reservoir of 'face'"),
+        ("site.file", "read_site", r"stages\[2\]: water_level"),
+        ("slope.site", "read_slope_site", "the reservoir of 'face'"),
+        ("water.site", "read_water_site", "the reservoir of 'face'"),
     ],
 )
 @pytest.mark.parametrize("level, words", [(200.0, 1), (7.0, 0)])
@@ -267,7 +267,7 @@ def test_water_far_above_the_ground_is_said(module, study, where, level, words, 
 
 
 def test_a_pressure_of_a_stage_that_pulls_is_refused(tmp_path):
-    from common.site_file import read_site
+    from common.site.file import read_site
 
     change = "water_level = 7.0", "water_level = 7.0\npressure = {crest = -10e3}"
     with pytest.raises(
@@ -314,9 +314,9 @@ def test_a_run_on_several_meshes_warns_once(tmp_path):
 
 
 def test_what_a_study_leaves_out_is_named(tmp_path):
-    from common.consolidation_site import read_consolidation_site
-    from common.site_file import read_site
-    from common.slope_site import read_slope_site
+    from common.consolidation.site import read_consolidation_site
+    from common.site.file import read_site
+    from common.slope.site import read_slope_site
 
     dry = [("water_level = 0.0", "release = 'left'"), ("water_level = 7.0\n", "")]
     path = written(tmp_path, ("[points]", "[pressures]\ncrest = 10e3\n[points]"), *dry)
@@ -334,8 +334,8 @@ def test_what_a_study_leaves_out_is_named(tmp_path):
 
 def test_the_beginning_is_the_same_in_all_studies_of_stages(tmp_path):
     """A first stage without a day is the beginning; otherwise what no stage fills is there."""
-    from common.consolidation_site import read_consolidation_site
-    from common.site_file import read_site
+    from common.consolidation.site import read_consolidation_site
+    from common.site.file import read_site
 
     staged = ROOT / "meshes" / "staged_embankment.toml"
     mechanical = read_site(staged, MPI.COMM_WORLD, 2.0).stages
@@ -368,8 +368,8 @@ def test_stiffness_that_grows_with_depth_has_its_settlement_in_consolidation(tmp
 
 
 def test_laws_are_of_effective_stresses_where_the_water_is_computed(tmp_path):
-    from common.site_file import read_site
-    from common.slope_site import read_slope_site
+    from common.site.file import read_site
+    from common.slope.site import read_slope_site
 
     path = written(tmp_path, ("cohesion = 10e3  # Pa", "cohesion = 10e3\nundrained = true\nwater_modulus = 1e8"))
     undrained = [isinstance(law, mpm.Undrained) for law in read_site(path, MPI.COMM_WORLD, 3.0).laws.values()]

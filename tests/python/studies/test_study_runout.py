@@ -85,7 +85,7 @@ def test_a_slide_too_small_for_its_cells_names_their_options():
 @pytest.mark.parametrize("last, said", [(200.0, "by 2 m/s"), (5.0, "")])
 def test_a_slide_that_still_moves_is_said(last, said):
     history = {"kinetic_energy_J": np.array([0.0, 1000.0, last])}
-    words = importlib.import_module("common.runout_endings").still_moving(
+    words = importlib.import_module("common.runout.endings").still_moving(
         history, 100.0
     )  # sqrt(2 x 200 J / 100 kg) = 2 m/s
     assert said in words and bool(words) == bool(said)
@@ -202,7 +202,7 @@ def test_wrong_places_are_named(tmp_path, text, message):
     (tmp_path / "places.csv").write_text(text)
     _, rupture = strength()
     with pytest.raises(mpm.InputError, match=message):
-        importlib.import_module("common.runout_places").read_places(tmp_path / "places.csv", rupture)
+        importlib.import_module("common.runout.places").read_places(tmp_path / "places.csv", rupture)
 
 
 def box_file(path, lower, upper, sides=6):
@@ -238,7 +238,7 @@ def test_places_and_structures_are_followed(tmp_path):
 
 def read_structures(*paths):
     _, rupture = strength()  # x -37.5 to 226.5 m, y -60 to 60 m
-    return importlib.import_module("common.runout_structures").read_structures(list(paths), rupture)
+    return importlib.import_module("common.runout.structures").read_structures(list(paths), rupture)
 
 
 def test_an_open_structure_and_two_of_one_name_are_refused(tmp_path):
@@ -312,7 +312,7 @@ def test_a_slide_that_splashes_out_of_the_top_of_its_mesh_names_the_headroom(tmp
 
 def test_particles_that_are_faster_than_they_can_fall_are_said_to_be_noise():
     """A slide that met a wall with 23 m/s ended with "fastest 114 m/s"."""
-    too_fast = importlib.import_module("common.runout_endings").too_fast
+    too_fast = importlib.import_module("common.runout.endings").too_fast
     fall = np.sqrt(2 * 9.81 * 31.0)
     assert f"single particles are faster than free fall through all of the height, {fall:.3g} m/s" in too_fast(
         1.6 * fall, 31.0

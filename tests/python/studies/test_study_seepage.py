@@ -18,7 +18,7 @@ SITE = (STUDIES.parent / "meshes" / "dam.toml").read_text()
 
 
 def read(text, folder):
-    from common.water_site import read_water_site
+    from common.water.site import read_water_site
 
     path = folder / "site.toml"
     path.write_text(text.replace('"dam.geo"', f'"{STUDIES.parent}/meshes/dam.geo"'))
@@ -87,7 +87,7 @@ def test_the_flow_of_a_homogeneous_block_is_darcys(tmp_path, capsys):
 
 def test_half_of_k_h_flows_under_a_pile_down_to_the_middle_of_a_layer():
     """K' / 2K of the modulus sin(pi / 4) (Polubarinova-Kochina 1962); the pile has a width here."""
-    from common.water_site import read_water_site
+    from common.water.site import read_water_site
 
     flow = read_water_site(STUDIES.parent / "meshes" / "sheet_pile.toml", MPI.COMM_WORLD).seepage(2)
     flow.solve()
@@ -177,7 +177,7 @@ def test_a_crest_that_is_overtopped_is_said(level, said, tmp_path):
 
 def test_a_floor_that_a_reservoir_leaves_out_is_said(tmp_path):
     """Water stands on a slope from (4, 3) to (10, 0) up to 2 m, but not on the level ground before its toe."""
-    from common.water_site import read_water_site
+    from common.water.site import read_water_site
 
     lines = ["Point(1) = {0, -2, 0}; Point(2) = {14, -2, 0}; Point(3) = {14, 0, 0}; Point(4) = {10, 0, 0}; Point(5) = {4, 3, 0};",
              "Point(6) = {0, 3, 0};", *(f"Line({k}) = {{{k}, {k % 6 + 1}}};" for k in range(1, 7)), "Curve Loop(1) = {1:6};",
@@ -206,7 +206,7 @@ def test_no_film_writes_none(tmp_path):
 
 
 def test_times_are_in_units_that_can_be_read():
-    from common.water_site import DAY, time_in_words
+    from common.water.site import DAY, time_in_words
 
     words = {0.0: "0 days", 4.86: "4.86 s", 60.0: "1 min", 432.0: "7.2 min", 0.01 * DAY: "0.01 days", DAY: "1 day",
              2.5 * DAY: "2.5 days", 1234.4 * DAY: "1234 days"}  # fmt: skip
@@ -258,6 +258,7 @@ def test_ground_that_is_sealed_by_mistake_is_said(conditions, said, tmp_path):
 def test_a_steady_flow_that_is_not_found_ends_the_study_with_its_message(tmp_path, monkeypatch):
     """`run_study` shows the message alone of a RunError."""
     import seepage
+
     from fenics_bridge import water
 
     monkeypatch.setattr(water.Seepage, "_solve", lambda *_: "it diverges")
@@ -280,7 +281,8 @@ ROWS = ((0.0, 5.0), (10 * 86400.0, 3.0), (20 * 86400.0, 3.0))
     ],
 )
 def test_what_a_site_describes_for_days_after_the_end_is_said(days, starts, said):
-    from common.flow_doubts import warn_of_later_changes
+    from common.site.flow_doubts import warn_of_later_changes
+
     from fenics_bridge import water
 
     with warnings.catch_warnings(record=True) as caught:
@@ -308,7 +310,7 @@ def test_the_gradient_beside_a_sheet_pile_is_that_of_the_water_that_leaves(tmp_p
 def test_round_off_gives_the_colour_bar_of_heads_no_arrow(lowest):
     """Linear elements have the head of a reservoir to their round-off; all heads are on the scale."""
     from common.field_plots import Field
-    from common.seepage_plots import HEAD, FlowPicture, _figure, _scales
+    from common.water.seepage_plots import HEAD, FlowPicture, _figure, _scales
 
     points, cells = np.array([(0.0, 0.0), (4.0, 0.0), (4.0, 1.0), (0.0, 1.0)]), np.array([(0, 1, 2), (0, 2, 3)])
     total = np.array([6.0, lowest, lowest, 6.0])
@@ -324,7 +326,8 @@ def test_round_off_gives_the_colour_bar_of_heads_no_arrow(lowest):
 )
 def test_quadratic_elements_for_rain_on_dry_soil_are_said(degree, varies, curve, said):
     """Rain that ponds enters dry sand on cells of 0.5 m with 0.1 mm in a day in quadratic elements, of 86 mm by gravity alone."""
-    from common.flow_doubts import warn_of_degree
+    from common.site.flow_doubts import warn_of_degree
+
     from fenics_bridge import water
 
     retention = water.VanGenuchten(1.5e-3, 2.7) if curve else water.AlwaysSaturated()

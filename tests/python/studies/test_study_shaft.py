@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from axisymmetric_cases import cylinder_particles
 from common.movie import areas
-from common.seepage_plots import flow_picture
-from common.site_file import read_site
-from common.slope_site import read_slope_site
-from common.water_site import read_water_site
+from common.site.file import read_site
+from common.slope.site import read_slope_site
+from common.water.seepage_plots import flow_picture
+from common.water.site import read_water_site
 from mpi4py import MPI
 from study_main import main
 

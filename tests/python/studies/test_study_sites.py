@@ -15,7 +15,7 @@ import mpm_core as mpm
 
 ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT / "studies"))
-site_file = importlib.import_module("common.site_file")
+site_file = importlib.import_module("common.site.file")
 
 
 def test_a_site_has_its_laws_weights_and_supports(tmp_path):

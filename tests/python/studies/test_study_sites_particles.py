@@ -14,7 +14,7 @@ import mpm_core as mpm
 
 ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT / "studies"))
-site_file = importlib.import_module("common.site_file")
+site_file = importlib.import_module("common.site.file")
 
 
 @pytest.mark.usefixtures("without_pictures")

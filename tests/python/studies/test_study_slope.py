@@ -98,7 +98,7 @@ def test_slopes_of_one_shape_slide_alike_whatever_their_height(tmp_path):
 
 
 def test_a_start_that_may_take_long_says_so(monkeypatch, capfd):
-    case_module = importlib.import_module("common.slope_case")
+    case_module = importlib.import_module("common.slope.case")
     case = case_module.build_slope(case_module.slope_options(["--particles-per-cell", "1"]), MPI.COMM_SELF)
     case_module.solved_fem(case, 10e3)
     assert "finite elements" not in capfd.readouterr().err

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from common.site.file import read_site
+from common.site.flow_doubts import warn_of_sealed_ground
+from common.stages.flow import StageFlow, warn_of_heave
+from common.stages.plots import stage_picture
 from mpi4py import MPI
 from study_main import main
 
 import fenics_bridge as bridge
 import mpm_core as mpm
-from common.flow_doubts import warn_of_sealed_ground
-from common.site_file import read_site
-from common.stage_flow import StageFlow, warn_of_heave
-from common.stage_plots import stage_picture
 
 MESHES = Path(__file__).parents[3] / "meshes"
 TEXT = (MESHES / "dewatered_excavation.toml").read_text().replace("cell_size = 1.0", "cell_size = 3.0")
@@ -73,7 +73,7 @@ def test_the_picture_of_a_stage_asks_no_rank_alone_for_its_flow(tmp_path, monkey
     site = read_site(site_in(tmp_path), MPI.COMM_WORLD)
     staged = bridge.FemSite(site.finite_elements(1))
     staged.carry_out(site.stages[0])
-    monkeypatch.setattr("common.stage_plots.level_line", lambda *_: pytest.fail("the flow is asked on one rank"))
+    monkeypatch.setattr("common.stages.plots.level_line", lambda *_: pytest.fail("the flow is asked on one rank"))
     picture = stage_picture(staged, "in situ")
     assert picture.flow is not None and np.allclose(picture.water[:, :, 1], 23.0, atol=0.01)
 

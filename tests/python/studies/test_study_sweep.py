@@ -144,7 +144,7 @@ def test_runs_end_with_a_sweep_that_is_killed(tmp_path):
 import sys
 sys.path[:0] = {[str(STUDIES), str(STUDIES.parent)]}
 from pathlib import Path
-from common.sweep_runs import Study, carry_out, runs_of
+from common.sweep.runs import Study, carry_out, runs_of
 study = Study(Path({str(tmp_path / "slow.py")!r}), [], 1, {{}})
 list(carry_out(runs_of(study, [{{}}], Path({str(tmp_path)!r})), study, 1, lambda: False))
 """

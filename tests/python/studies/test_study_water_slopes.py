@@ -85,7 +85,7 @@ def test_a_reservoir_that_falls_below_its_ground_is_said_to_have_no_steady_flow(
 
 
 def test_slower_tables_take_longer(tmp_path):
-    from common.slope_site import read_slope_site
+    from common.slope.site import read_slope_site
 
     path = site("drawdown", tmp_path)
     one, ten = (read_slope_site(path, MPI.COMM_WORLD, 3.0, slower).times(1e9) for slower in (1.0, 10.0))
@@ -123,7 +123,7 @@ def test_a_slope_that_fails_with_the_strength_of_davis_only_says_why_its_particl
 
 
 def test_a_slide_that_ends_early_does_not_come_to_rest(tmp_path, capsys, monkeypatch):
-    from common import water_slides
+    from common.water import slides as water_slides
 
     whole = water_slides.slide
     monkeypatch.setattr(water_slides, "slide", lambda *given: (whole(*given)[0], "interrupted at 1 s"))
@@ -142,8 +142,8 @@ def test_a_slide_that_ends_early_does_not_come_to_rest(tmp_path, capsys, monkeyp
 def test_only_particles_at_rest_that_are_stronger_than_davis_has_it_are_explained(change, said, tmp_path):
     from argparse import Namespace
 
-    from common.slope_site import read_slope_site
-    from common.water_slope_runs import rests_all_the_same
+    from common.slope.site import read_slope_site
+    from common.water.runs import rests_all_the_same
 
     case = {"moved": 0.01, "rests": True, "davis": True, "dilation": 0.0} | change
     angle = f"friction_angle = 27.0\ndilation_angle = {case['dilation']}"
@@ -188,7 +188,7 @@ def test_a_site_without_rain_is_refused(tmp_path):
 
 
 def test_factors_of_safety_are_not_lost_with_a_slide_that_cannot_start(tmp_path, monkeypatch, capsys):
-    slides = importlib.import_module("common.water_slides")
+    slides = importlib.import_module("common.water.slides")
     monkeypatch.setattr(slides, "HOLDING", ())
     path = site("drawdown", tmp_path, ("friction_angle = 27.0", "friction_angle = 20.0"))
     arguments = f"{SMALL} --days 3 --slide --no-pictures --site {path} --output {tmp_path / 'results'}"
@@ -212,7 +212,7 @@ def test_pic_hardly_brakes_the_slide(tmp_path):
 
 def doubts(path):
     """What reading the site of a slope warns of."""
-    from common.slope_site import read_slope_site
+    from common.slope.site import read_slope_site
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

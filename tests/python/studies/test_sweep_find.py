@@ -7,7 +7,7 @@ import math
 
 import pytest
 import study_main
-from common.sweep_find import MOST_RUNS, NEAR, find, wanted_of
+from common.sweep.find import MOST_RUNS, NEAR, find, wanted_of
 
 from mpm_core import InputError
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import study_main  # noqa: F401
-from common.site_tables import merged
-from common.sweep_maps import hazard_maps
-from common.sweep_plan import correlation_of, plan, variable_of
-from common.sweep_plots import in_order
-from common.sweep_results import (
+from common.site.tables import merged
+from common.sweep.maps import hazard_maps
+from common.sweep.plan import correlation_of, plan, variable_of
+from common.sweep.plots import in_order
+from common.sweep.results import (
     changes_alone,
     drawn_results,
     ended_before,
@@ -22,7 +22,7 @@ from common.sweep_results import (
     values_of,
     write_table,
 )
-from common.sweep_runs import Run, Study, numbers_of, runs_of, site_with, take_results
+from common.sweep.runs import Run, Study, numbers_of, runs_of, site_with, take_results
 from scipy import stats
 from sweep import refusal
 

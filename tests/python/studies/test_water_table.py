@@ -12,10 +12,12 @@ from matplotlib.colors import to_rgba
 from matplotlib.legend import Legend
 
 import fenics_bridge as bridge
-from studies.common import field_plots, seepage_plots, stage_plots
+from studies.common import field_plots
 from studies.common.field_plots import Field, save_mechanism
-from studies.common.seepage_plots import MODERATE, PRESSURE, FlowPicture, pressure_limits, save_flow
-from studies.common.water_table import TABLE, draw_water_table, level_line, zero_line
+from studies.common.site.water_table import TABLE, draw_water_table, level_line, zero_line
+from studies.common.stages import plots as stage_plots
+from studies.common.water import seepage_plots
+from studies.common.water.seepage_plots import MODERATE, PRESSURE, FlowPicture, pressure_limits, save_flow
 
 ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT / "studies"))
@@ -192,7 +194,7 @@ def test_a_mechanism_shows_the_water_and_names_the_soils(monkeypatch):
 def test_a_site_shows_the_water_of_its_last_stage(study, level, tmp_path, monkeypatch):
     """The flood of the dike stands at 7 m; collapse leaves out what stages change, and with it their water."""
     waters = []
-    runs = importlib.import_module("common.site_runs")
+    runs = importlib.import_module("common.site.runs")
     monkeypatch.setattr(runs, "save_mechanism", lambda path, field, title, water=None, members=(): waters.append(water))
     options = f"--site {ROOT}/meshes/dike.toml --meshes 1 --cell-size 3 --output {tmp_path / 'results'}"
     assert importlib.import_module(study).main(options.split()) == 0
@@ -203,7 +205,7 @@ def test_a_site_shows_the_water_of_its_last_stage(study, level, tmp_path, monkey
 
 def test_stages_show_the_water_of_each(tmp_path, monkeypatch):
     drawn = []
-    excavation, runs = importlib.import_module("excavation"), importlib.import_module("common.stage_runs")
+    excavation, runs = importlib.import_module("excavation"), importlib.import_module("common.stages.runs")
     monkeypatch.setattr(runs, "stage_pictures", lambda stages, rows, pictures, folder: drawn.extend(pictures) or {})
     options = f"--site {ROOT}/meshes/dike.toml --cell-size 3 --elements P1 --no-compare --output {tmp_path / 'results'}"
     assert excavation.main(options.split()) == 0

@@ -35,7 +35,7 @@ surface = [0.25, 2.0]
 
 @pytest.mark.parametrize("element", water.Element)
 def test_ground_above_its_water_table_does_not_settle_without_a_load(element, tmp_path):
-    from common.consolidation_site import read_consolidation_site
+    from common.consolidation.site import read_consolidation_site
 
     (tmp_path / "site.toml").write_text(SITE)
     site = read_consolidation_site(tmp_path / "site.toml", MPI.COMM_WORLD)

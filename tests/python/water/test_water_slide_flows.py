@@ -20,7 +20,7 @@ DAY = 86400.0
 
 def filled(conductivity, *boundary):
     """Particles that `let_water_flow` has filled, with two laws for the soil as at a slide."""
-    from common.water_slides import let_water_flow
+    from common.water.slides import let_water_flow
 
     domain, cell_tags, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (4.0, 2.0), (8, 4), body=((0.0, 0.0), (4.0, 1.0)))
     model = mpm.Model(bridge.background_mesh(domain, cell_tags, facet_tags), [LAW, LAW])
@@ -50,7 +50,7 @@ def of_levels(*levels, times=()):
 
 
 def test_reservoirs_of_different_levels_are_refused():
-    from common.water_slides import require_one_level
+    from common.water.slides import require_one_level
 
     same = ((0.0, 5.0), (DAY, 3.0))
     require_one_level(of_levels(), DAY)
@@ -64,7 +64,7 @@ def test_reservoirs_of_different_levels_are_refused():
 
 def test_they_are_refused_before_any_work(tmp_path, monkeypatch):
     import drawdown
-    from common.slope_site import SlopeSite
+    from common.slope.site import SlopeSite
 
     meshes = STUDIES.parent / "meshes"
     text = (meshes / "drawdown.toml").read_text().replace('"bank_on_ground.geo"', f'"{meshes}/bank_on_ground.geo"')

@@ -60,7 +60,7 @@ def test_lines_end_where_facets_do_not_meet():
 
 
 def test_free_water_is_beside_the_dyke_only():
-    from common.slope_site import SlopeSite
+    from common.slope.site import SlopeSite
 
     domain, tags = dyke()
     slope = SlopeSite(None, {}, [water.Reservoir(BEDS, 3.0)], (domain, None, tags))

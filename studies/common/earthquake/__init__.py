@@ -1,0 +1,1 @@
+"""Earthquakes: motions of rock, the response of a site, sliding blocks."""

@@ -1,0 +1,1 @@
+"""Run-out over terrain."""

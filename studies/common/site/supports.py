@@ -1,0 +1,98 @@
+"""Supports of a site by boundary, as its file names them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fenics_bridge as bridge
+import mpm_core as mpm
+from fenics_bridge.compat import facet_nodes
+from fenics_bridge.fem.supports import tagged_facets
+
+from ..checks import say
+
+LEAST_LEVEL = 0.05
+"""Part of the area of a base, seen from above, below which it stands upright"""
+DEFAULT_SUPPORTS = {
+    "base": "fixed",
+    **dict.fromkeys(("left", "right", "front", "back", "sides", "axis", "far"), "roller"),
+}
+"""Supports of boundaries by their names, where a file has none"""
+
+
+def supports_of(table: dict, path: Path, domain: Any, facet_tags: Any) -> list[bridge.Support]:
+    """The supports that a site names; by default those of boundaries with the names of `DEFAULT_SUPPORTS`. Collective."""
+    names = bridge.names_of(facet_tags)
+    given = table.get("supports") or {name: kind for name, kind in DEFAULT_SUPPORTS.items() if name in names}
+    if not given:
+        raise mpm.InputError(
+            f"{path} has no [supports], and the mesh has no boundary named {', '.join(DEFAULT_SUPPORTS)}; it has {list(names)}"
+        )
+    _warn_of_upright_base(path, domain, facet_tags)
+    if not table.get("supports"):
+        _warn_of_free_sides(path, domain, facet_tags, given)
+    return [support_of(name, kind, f"{path}: supports.{name}", domain, facet_tags) for name, kind in given.items()]
+
+
+def support_of(name: str, kind: str, where: str, domain: Any, facet_tags: Any) -> bridge.Support:
+    """The support of a boundary, of a kind that a file names; where: it stands, for messages. Collective."""
+    if kind == "fixed":
+        return bridge.fixed(name)
+    if kind != "roller":
+        raise mpm.InputError(f"{where} is {kind!r}, expected 'fixed' or 'roller'")
+    normal = bridge.flat_normal(domain, facet_tags, name)
+    if normal is None:
+        raise mpm.InputError(
+            f"{where}: a roller needs a boundary at right angles to an axis, expected 'fixed' for this one"
+        )
+    return bridge.roller(name, normal)
+
+
+def _warn_of_free_sides(path: Path, domain: Any, facet_tags: Any, held: Mapping[str, str]) -> None:
+    """Warn of boundaries at the sides of a mesh that have no support, since their names are none of the default ones. Collective.
+
+    Args:
+        path: of the file, which names no supports.
+        domain: the mesh.
+        facet_tags: tags of its boundaries.
+        held: supports by boundary.
+    """
+    dim, comm = domain.geometry.dim, domain.comm
+    x = domain.geometry.x
+    low, high = (reduce(comm.allgather(values), axis=0) for reduce, values in
+                 ((np.min, x.min(axis=0, initial=np.inf)), (np.max, x.max(axis=0, initial=-np.inf))))  # fmt: skip
+    free = []
+    for name in bridge.names_of(facet_tags):
+        normal = None if name in held else bridge.flat_normal(domain, facet_tags, name)
+        if normal is None or normal[-1]:
+            continue
+        axis = normal.index(1.0)
+        places = x[facet_nodes(domain, tagged_facets(comm, facet_tags, name, "supports"))][:, :, axis].ravel()
+        place = np.mean([one for one in comm.allgather(places.mean() if len(places) else None) if one is not None])
+        if min(abs(place - low[axis]), abs(place - high[axis])) < 1e-6 * (high[axis] - low[axis]):
+            free.append(name)
+    if free:
+        several = len(free) > 1
+        say(f"{path}: the boundar{'ies' if several else 'y'} {' and '.join(map(repr, free))} at the side{'s' if several else ''} of the mesh "
+            f"{'are' if several else 'is'} free, since without [supports] only {', '.join(DEFAULT_SUPPORTS)} are held: name {'them' if several else 'it'} "
+            "in [supports], or give [supports] without it where it is a free surface")  # fmt: skip
+
+
+def _warn_of_upright_base(path: Path, domain: Any, facet_tags: Any) -> None:
+    """Warn where the boundary named base stands upright, as in a mesh whose vertical axis is another one; path: of the file. Collective."""
+    if "base" not in bridge.names_of(facet_tags):
+        return
+    dim = domain.geometry.dim
+    corners = domain.geometry.x[facet_nodes(domain, tagged_facets(domain.comm, facet_tags, "base", "supports"))]
+    edges = corners[:, 1:] - corners[:, :1]
+    normals = np.cross(edges[:, 0], edges[:, 1] if dim == 3 else [0.0, 0.0, 1.0])
+    here = np.abs(normals[:, dim - 1]).sum(), np.linalg.norm(normals, axis=1).sum()
+    level, area = np.sum(domain.comm.allgather(here), axis=0)
+    if level < LEAST_LEVEL * area:
+        up = "xyz"[dim - 1]
+        say(f"{path}: the boundary 'base' stands upright, but {up} points up and the weight acts against it: turn the mesh so that its height "
+            f"is along {up}")  # fmt: skip

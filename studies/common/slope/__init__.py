@@ -1,0 +1,1 @@
+"""The slope of the studies, and sites cut as a slope."""

@@ -1,0 +1,1 @@
+"""Stages of construction of a site."""

@@ -1,0 +1,1 @@
+"""Seepage, levees, drawdown and rain."""
