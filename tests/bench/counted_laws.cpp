@@ -61,10 +61,11 @@ Law law_of(std::string_view name, bool yields)
                     largest_pressure,
                     yields ? 0.01 : 1.0, // q/p is 0.75 at the start
                     1e3};
-  if (name == "HardeningSoil")
+  if (name == "HardeningSoil" || name == "small-strain HardeningSoil")
   {
     HardeningSoil law{10e6, 10e6, 30e6, 100, 33};
     law.vertical_preconsolidation = yields ? 0 : largest_pressure;
+    law.small_strain_modulus = name == "HardeningSoil" ? 0 : 50e6;
     return law;
   }
   std::fprintf(stderr, "unknown law %s\n", name.data());

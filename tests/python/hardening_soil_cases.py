@@ -20,6 +20,10 @@ def clay(**changes):
     return mpm.HardeningSoil(**{**CLAY, **changes})
 
 
+def small_strain_sand(**changes):
+    return sand(**{"small_strain_modulus": 150e6, "threshold_strain": 2e-4, **changes})
+
+
 def isotropic(pressure):
     return np.array([-pressure] * 3 + [0.0] * 3)
 

@@ -95,6 +95,17 @@ Stresses stresses_of(const HardeningSoil& law)
   return {apex, reference, std::max(apex - law.tension_cutoff, least_stress * reference)};
 }
 
+/// Shear modulus of unloading at the reference pressure [Pa]
+double unloading_shear_modulus(const HardeningSoil& law) { return 0.5 * law.unloading_modulus / (1 + law.poisson); }
+
+SmallStrain small_strain_of(const HardeningSoil& law)
+{
+  if (law.small_strain_modulus == 0)
+    return {};
+  return bricks_of(law.small_strain_modulus / unloading_shear_modulus(law), law.threshold_strain,
+                   1 + law.unloading_modulus / (2 * law.secant_modulus));
+}
+
 /// The soil with its full strength, without cap
 Soil uncapped(const HardeningSoil& law)
 {
@@ -114,7 +125,8 @@ Soil uncapped(const HardeningSoil& law)
           1,
           least,
           0,
-          0};
+          0,
+          small_strain_of(law)};
 }
 
 /// The strength divided by a factor: c / F and tan(phi) / F. The apex c cot(phi) stays.
@@ -198,7 +210,8 @@ Start<N> start_of(const Soil& soil, const PointBatch<D>& points, Index i, Deviat
           cap_compliance(soil, cap),
           -3 * mean<D, N>(strain),
           square_along<D, N>(deviators.stress, deviators.strain),
-          cube_along<D, N>(deviators.stress, deviators.strain)};
+          cube_along<D, N>(deviators.stress, deviators.strain),
+          stiffening_of<D, N>(soil.small, points, i, deviators.strain)};
 }
 
 template <class N>
@@ -214,14 +227,17 @@ Mask<N> is_sound(const End<N>& end)
   return end.pressure + end.trial_q < most_stress;
 }
 
+/// @param small  derivatives of the small-strain stiffness
 template <int D>
 void write_tangent(const Soil& soil, const Start<double>& start, const Solution<double>& solution,
-                   const Deviators<D, double>& deviators, double* tangent)
+                   const Deviators<D, double>& deviators, const StiffeningSlopes<D>& small, double* tangent)
 {
-  using T = Dual<5>;
+  constexpr std::size_t n = n_stress<D>;
+  using T = Dual<7>;
+  const auto change = [](std::size_t number) { return variable<7>(0.0, number); };
   const auto& [log_stress, mobilised] = solution.at;
-  const End<T> end = end_of<T>(soil, start, {variable<5>(log_stress, 0), variable<5>(mobilised, 1)},
-                               {variable<5>(0.0, 2), variable<5>(0.0, 3), variable<5>(0.0, 4)});
+  const End<T> end = end_of<T>(soil, start, {variable<7>(log_stress, 0), variable<7>(mobilised, 1)},
+                               {change(2), change(3), change(4), change(5), change(6)});
   const auto& volume = end.volumetric.slopes;
   const auto& shape = end.deviatoric.slopes;
   const double determinant = volume[0] * shape[1] - volume[1] * shape[0];
@@ -242,6 +258,13 @@ void write_tangent(const Soil& soil, const Start<double>& start, const Solution<
   const double cosine = lode_cosine(polynomial<double>(start.cube, 2 * trial.shear), trial.q);
   add_secant_tangent<D>(trial, deviators.strain, ratio.value, slopes(4),
                         lode_cosine_slope<D>(trial.deviator, trial.q, cosine), tangent);
+  if (!soil.small.exists())
+    return;
+  const SymTensor<D> by_stiffness = stress_slope<D>(trial, deviators.strain, ratio.value, slopes(5));
+  const SymTensor<D> by_softening = stress_slope<D>(trial, deviators.strain, ratio.value, slopes(6));
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j)
+      tangent[i * n + j] += by_stiffness[i] * small.stiffness[j] + by_softening[i] * small.softening[j];
 }
 
 template <int D, class N>
@@ -253,6 +276,7 @@ void write(const Soil& soil, const Start<N>& start, const End<N>& end, const Dev
   add_to_state<D, N>(points, i, 0, end.plastic);
   store(start.shear + end.shear - soil.shear, points.state[1] + i);
   store(start.growth + end.cap_growth, points.state[2] + i);
+  drag<D, N>(soil.small, points, i, deviators.strain);
 }
 
 template <class N>
@@ -269,9 +293,10 @@ Outcome update_point(const Soil& soil, const PointBatch<D>& points, Index i, dou
   const std::optional<Solution<double>> solution = is_sound(start) ? solution_of(soil, start) : std::nullopt;
   if (!solution || !is_sound(solution->end))
     return Outcome::failed;
+  if (tangent) // before the states change
+    write_tangent<D>(soil, start, *solution, deviators, stiffening_slopes<D>(soil.small, points, i, deviators.strain),
+                     tangent);
   write<D, double>(soil, start, solution->end, deviators, points, i);
-  if (tangent)
-    write_tangent<D>(soil, start, *solution, deviators, tangent);
   return is_plastic(solution->end) || solution->is_loose ? Outcome::plastic : Outcome::elastic;
 }
 
@@ -308,6 +333,10 @@ void check(const HardeningSoil& law)
   require(law.unloading_modulus > initial, "unloading_modulus", law.unloading_modulus,
           "above the initial modulus of first loading, 2 secant_modulus / (2 - failure_ratio) = " +
               number_text(initial) + " Pa");
+  require(law.small_strain_modulus == 0 || law.small_strain_modulus > unloading_shear_modulus(law),
+          "small_strain_modulus", law.small_strain_modulus,
+          "0 for none, or above the shear modulus of unloading, unloading_modulus / (2 (1 + poisson)) = " +
+              number_text(unloading_shear_modulus(law)) + " Pa");
   const Soil soil = uncapped(law);
   const Oedometer test = oedometer_of(law, soil);
   const double k0 = normal_k0(law);
@@ -334,11 +363,33 @@ double unloading_modulus(const HardeningSoil& law, double stress)
   return law.unloading_modulus * std::pow(std::max(stress + apex, least) / reference, law.exponent);
 }
 
-double shear_modulus(const HardeningSoil& law) { return 0.5 * law.unloading_modulus / (1 + law.poisson); }
+double shear_modulus(const HardeningSoil& law)
+{
+  return std::max(hardening_soil::unloading_shear_modulus(law), law.small_strain_modulus);
+}
 
 double p_wave_modulus(const HardeningSoil& law)
 {
-  return law.unloading_modulus * (1 - law.poisson) / ((1 + law.poisson) * (1 - 2 * law.poisson));
+  return 2 * shear_modulus(law) * (1 - law.poisson) / (1 - 2 * law.poisson);
+}
+
+int n_state(const HardeningSoil& law)
+{
+  using namespace hardening_soil;
+  return static_cast<int>(law.small_strain_modulus == 0 ? largest_column
+                                                        : first_brick_column + n_bricks * brick_components.size());
+}
+
+std::vector<std::string> state_names(const HardeningSoil& law)
+{
+  std::vector<std::string> names{"plastic_strain", "shear_hardening", "log_preconsolidation"};
+  if (law.small_strain_modulus == 0)
+    return names;
+  names.emplace_back("largest_small_strain");
+  for (std::size_t brick = 1; brick <= hardening_soil::n_bricks; ++brick)
+    for (const char* component : hardening_soil::brick_component_names)
+      names.push_back("brick_" + std::to_string(brick) + "_" + component);
+  return names;
 }
 
 template <int D>

@@ -28,6 +28,10 @@ namespace mpm::materials
 /// An increment is implicit, with the secant of the elastic modulus between the stresses of its start and its end. The
 /// equations depend on the Lode angle of the trial deviator, rounded by 0.03 degrees at the edges of the hexagon.
 ///
+/// With a small-strain modulus G0 all elastic moduli are larger while the strain is small since the last reversals, by
+/// up to G0 over the shear modulus of unloading, and plastic strains are smaller, by H_i
+/// (hardening_soil_small_strain.h).
+///
 /// Sources: Schanz, Vermeer, Bonnier (1999), The hardening soil model: formulation and verification, Beyond 2000 in
 /// Computational Geotechnics, 281-296; Benz (2007), Small-strain stiffness of soils and its numerical consequences,
 /// University of Stuttgart, chapter 6.
@@ -36,6 +40,7 @@ struct HardeningSoil
   double secant_modulus, oedometer_modulus, unloading_modulus, cohesion, friction_angle;
   double dilation_angle = 0, exponent = 0.5, poisson = 0.2, normal_k0 = 0, failure_ratio = 0.9;
   double vertical_preconsolidation = 0, reference_pressure = 100e3;
+  double small_strain_modulus = 0, threshold_strain = 2e-4;
   double tension_cutoff = unlimited; ///< without effect from c cot(phi) upwards
   double strength_factor = 1;        ///< what c and tan(phi) are divided by; the cap is that of the full strength
 
@@ -69,18 +74,28 @@ struct HardeningSoil
                      0.0),
         parameter<L>("reference_pressure", entry<&L::reference_pressure>, "Pa", above<L>(0),
                      "stress at which the soil has its moduli", 100e3),
+        parameter<L>("small_strain_modulus", entry<&L::small_strain_modulus>, "Pa", at_least<L>(0),
+                     "G0: shear modulus at very small strains and the reference pressure; 0 for a law without "
+                     "small-strain stiffness",
+                     0.0),
+        parameter<L>("threshold_strain", entry<&L::threshold_strain>, "-", {{0, false}, {0.01, true}},
+                     "gamma_0.7: shear strain at which the secant shear modulus of first loading is 0.722 G0", 2e-4),
         parameter<L>("tension_cutoff", entry<&L::tension_cutoff>, "Pa", or_infinite(at_least<L>(0)),
                      "tension cut-off: largest principal stress; without effect above the apex c cot(phi)", unlimited),
     };
   }
 
   static constexpr std::string_view name = "HardeningSoil";
-  /// `shear_hardening` is gamma less that of the law's start; `log_preconsolidation` is ln of p_p over that of the
-  /// start.
-  static constexpr std::array state_names{"plastic_strain", "shear_hardening", "log_preconsolidation"};
 
   bool operator==(const HardeningSoil&) const = default;
 };
+
+/// plastic_strain, shear_hardening (gamma less that of the law's start) and log_preconsolidation (ln of p_p over that
+/// of the start). With small-strain stiffness also largest_small_strain and the distances of its bricks, deviators
+/// positive in tension, of which plane strain uses three components.
+int n_state(const HardeningSoil& law);
+std::vector<std::string> state_names(const HardeningSoil& law);
+inline Needs needs(const HardeningSoil&) { return {}; }
 
 /// Throws InputError when a parameter is out of its range, or the oedometer modulus cannot be reached with the others.
 void check(const HardeningSoil& law);
@@ -95,10 +110,10 @@ double smallest_stress(const HardeningSoil& law, const SymTensor<D>& stress);
 /// c cot(phi) [Pa]
 double attraction(const HardeningSoil& law);
 
-/// Modulus of the compression wave, K + 4G/3 [Pa], of unloading at the reference pressure
+/// Modulus of the compression wave, K + 4G/3 [Pa], at the reference pressure: of unloading, or at very small strains
 double p_wave_modulus(const HardeningSoil& law);
 
-/// Shear modulus of unloading at the reference pressure [Pa]
+/// Shear modulus at the reference pressure [Pa]: of unloading, or at very small strains
 double shear_modulus(const HardeningSoil& law);
 
 /// The states shear_hardening and log_preconsolidation of a point that has carried its stress, and what the law begins

@@ -4,6 +4,7 @@
 /// (`Lanes`), with derivatives or without. Stresses and strains are positive in compression here.
 
 #include "materials/laws/hardening_soil.h"
+#include "materials/laws/hardening_soil_small_strain.h"
 #include "materials/tools/dual.h"
 #include "materials/tools/lode.h"
 #include "materials/tools/secant.h"
@@ -31,6 +32,7 @@ struct Soil
   double cap_slope, cap_modulus;           ///< 1 / alpha and H [Pa]
   double least;                            ///< least s3 + a, by the tension cut-off as well [Pa]
   double shear, cap;                       ///< gamma and p_p of the law's start
+  SmallStrain small{};                     ///< small-strain stiffness
 
   double bulk_per_young() const { return 1 / (3 * (1 - 2 * poisson)); }
   double shear_per_young() const { return 0.5 / (1 + poisson); }
@@ -87,13 +89,6 @@ T shear_of(const Soil& soil, const T& stress, const T& softness, const T& mobili
   return soil.slope * stress * softness * (loading - 2 / soil.unloading * mobilised);
 }
 
-/// x^y of a positive number
-template <class N>
-N power(const N& x, double y)
-{
-  return each(x, [y](double number) { return falling_exponential(-y * natural_logarithm(number)); });
-}
-
 /// t^-m of s3 + a
 template <class N>
 N softness_of(const Soil& soil, const N& stress)
@@ -141,14 +136,15 @@ N cap_compliance(const Soil& soil, const N& cap)
 template <class N>
 struct Start
 {
-  N pressure;              ///< p + a
-  N stress, softness;      ///< s3 + a, at least the least one, and t^-m of it
-  N mobilised;             ///< (s1 - s3) / q_f, at most 1
-  N shear, cap, growth;    ///< gamma, p_p, and ln of it over that of the law's start
-  N compliance;            ///< of the cap
-  N volumetric;            ///< volumetric strain increment
-  std::array<N, 3> square; ///< q^2 of the trial by 2 G
-  std::array<N, 4> cube;   ///< q^3 cos(3 theta) of the trial by 2 G
+  N pressure;                            ///< p + a
+  N stress, softness;                    ///< s3 + a, at least the least one, and t^-m of it
+  N mobilised;                           ///< (s1 - s3) / q_f, at most 1
+  N shear, cap, growth;                  ///< gamma, p_p, and ln of it over that of the law's start
+  N compliance;                          ///< of the cap
+  N volumetric;                          ///< volumetric strain increment
+  std::array<N, 3> square;               ///< q^2 of the trial by 2 G
+  std::array<N, 4> cube;                 ///< q^3 cos(3 theta) of the trial by 2 G
+  Stiffening<N> small{N{} + 1, N{} + 1}; ///< small-strain stiffness over the increment
 };
 
 /// What the end is worked out from beside the start; each is differentiated by for the tangent.
@@ -162,6 +158,7 @@ template <class T>
 struct Changes
 {
   T volumetric{}, q{}, cosine{}; ///< of the volumetric strain, and of q and cos(3 theta) of the trial at a fixed G
+  T stiffness{}, softening{};    ///< of the small-strain stiffness
 };
 
 template <class T>
@@ -191,7 +188,8 @@ End<T> end_of(const Soil& soil, const Start<Number<T>>& start, const Unknowns<T>
   const Exponential<T> growth = exponential_of(x.log_stress);
   const Exponential<T> of_strain = exponential_of<T>((1 - soil.exponent) * x.log_stress); // the integral of 1 / E_ur
   const T stress = start.stress * growth.factor, softness = start.softness * of_strain.factor / growth.factor;
-  const T young = soil.unloading / start.softness * growth.mean / of_strain.mean;
+  const T young =
+      soil.unloading / start.softness * growth.mean / of_strain.mean * (start.small.stiffness + changes.stiffness);
   const T shear_modulus = soil.shear_per_young() * young;
 
   const N double_shear = 2 * value_of(shear_modulus);
@@ -211,12 +209,14 @@ End<T> end_of(const Soil& soil, const Start<Number<T>>& start, const Unknowns<T>
 
   const T hardening = positive_part<T>(shear_of(soil, stress, softness, mobilised) - start.shear);
   const T failing = failure_strain * positive_part<T>(x.mobilised - 1);
-  const T sheared = hardening + failing;
+  const T softening = start.small.softening + changes.softening;
+  const T sheared = hardening * softening + failing;
   const T dilation = dilatancy(soil, mobilised);
 
   const T cap = cap_through(soil, pressure, q, direction.cap) / start.cap;
   const T cap_growth = chosen<T>(value_of(cap) > 1, logarithm(cap), T{});
-  const T compaction = start.compliance * cap_growth * exponential_of<T>((1 - soil.exponent) * cap_growth).mean;
+  const T compaction =
+      softening * start.compliance * cap_growth * exponential_of<T>((1 - soil.exponent) * cap_growth).mean;
   const T by_cap = soil.cap_slope * direction.cap;
   const T plastic = deviatoric_part<T>(direction, dilation, sheared) + compaction * by_cap * by_cap * q / pressure;
 

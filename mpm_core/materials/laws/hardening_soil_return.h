@@ -45,7 +45,7 @@ ElasticEnd<N> elastic_end(const Soil& soil, const Start<N>& start, const N& log_
 {
   const Exponential<N> growth = exponential_of(log_stress);
   const Exponential<N> of_strain = exponential_of<N>((1 - soil.exponent) * log_stress);
-  const N young = soil.unloading / start.softness * growth.mean / of_strain.mean;
+  const N young = soil.unloading / start.softness * growth.mean / of_strain.mean * start.small.stiffness;
   const N shear = soil.shear_per_young() * young;
   const N q = root(larger<N>(polynomial<N>(start.square, 2 * shear), N{}));
   const Direction<N> direction = direction_of(soil, lode_cosine<N>(polynomial<N>(start.cube, 2 * shear), q));

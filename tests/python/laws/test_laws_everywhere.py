@@ -25,6 +25,10 @@ HARDENING = mpm.HardeningSoil(
     secant_modulus=20e6, oedometer_modulus=20e6, unloading_modulus=60e6, cohesion=1e3, friction_angle=33.0, dilation_angle=3.0,
     vertical_preconsolidation=60e3,
 )  # fmt: skip
+SMALL_STRAIN = mpm.HardeningSoil(
+    **{p.name: getattr(HARDENING, p.name) for p in mpm.HardeningSoil.parameters}
+    | {"small_strain_modulus": 100e6, "threshold_strain": 1e-4}
+)
 LAWS = {
     "elastic": mpm.LinearElastic(**ELASTIC),
     "Mohr-Coulomb": SOIL,
@@ -43,6 +47,9 @@ LAWS = {
     "Hardening Soil": HARDENING,
     "undrained Hardening Soil": mpm.Undrained(HARDENING, water_modulus=2e8, porosity=0.45),
     "Hencky Hardening Soil": mpm.Hencky(HARDENING),
+    "small-strain Hardening Soil": SMALL_STRAIN,
+    "undrained small-strain Hardening Soil": mpm.Undrained(SMALL_STRAIN, water_modulus=2e8, porosity=0.45),
+    "Hencky small-strain Hardening Soil": mpm.Hencky(SMALL_STRAIN),
     "Hencky": mpm.Hencky(SOIL),
     "viscoplastic": mpm.ViscoplasticMohrCoulomb(
         **ELASTIC, cohesion=10e3, friction_angle=25.0, dilation_angle=5.0, viscosity=1e-6

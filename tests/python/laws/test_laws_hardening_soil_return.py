@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from hardening_soil_cases import clay, isotropic, sand
+from hardening_soil_cases import clay, isotropic, sand, small_strain_sand
 from law_cases import Batch, assert_alike_alone_and_among_others, assert_tangent, random_points, walk
 
 import mpm_core as mpm
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("soil", [sand, clay])
+@pytest.mark.parametrize("soil", [sand, clay, small_strain_sand])
 @pytest.mark.parametrize("strain", [1e-5, 1e-4, 1e-3, 1e-2])
 def test_tangent_is_the_derivative_of_the_stress(dim, soil, strain):
     stress, increment = random_points(dim, 400, pressure=60e3, deviator=10e3, strain=strain)
@@ -19,8 +19,9 @@ def test_tangent_is_the_derivative_of_the_stress(dim, soil, strain):
     assert_tangent(batch, 1e-4 * strain, tolerance=1e-5)
 
 
-def test_tangent_at_failure():
-    law = sand()
+@pytest.mark.parametrize("soil", [sand, small_strain_sand])
+def test_tangent_at_failure(soil):
+    law = soil()
     stress, state = walk(law, np.tile(isotropic(100e3), (100, 1)), 2e-3, 20)
     increment = np.random.default_rng(3).normal(0.0, 1e-3, stress.shape)
     batch = Batch(law, stress, increment, state)
@@ -47,7 +48,7 @@ def test_more_increments_come_closer_to_the_limit_to_first_order(soil, total):
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("soil", [sand, clay])
+@pytest.mark.parametrize("soil", [sand, clay, small_strain_sand])
 def test_increments_of_any_size_return_to_admissible_stresses(dim, soil):
     law = soil()
     for strain in (1e-6, 1e-3, 0.03, 0.1):
@@ -60,16 +61,17 @@ def test_increments_of_any_size_return_to_admissible_stresses(dim, soil):
         assert state == pytest.approx(state_before, abs=1e-7)
 
 
+@pytest.mark.parametrize("soil", [sand, small_strain_sand])
 @pytest.mark.parametrize("dim", [2, 3])
-def test_a_point_is_updated_alike_alone_and_among_others_with_and_without_tangent(dim):
+def test_a_point_is_updated_alike_alone_and_among_others_with_and_without_tangent(dim, soil):
     # Elastic, plastic, loose and failing, new and hardened, with increments from tiny to huge ones
-    rng, law = np.random.default_rng(2), sand()
+    rng, law = np.random.default_rng(2), soil()
     stress, increment = random_points(dim, 801, pressure=60e3, deviator=10e3, strain=1.0)
     increment *= 10 ** rng.uniform(-7, -1, (801, 1))
     increment[17, 1], stress[100, 1] = np.nan, np.inf
-    state = np.zeros((801, 3))
+    state = np.zeros((801, law.n_state))
     hardened = rng.uniform(size=801) < 0.5
-    state[hardened, 1:] = rng.uniform(0.0, [2e-3, 12.0], (hardened.sum(), 2))
+    state[hardened, 1:3] = rng.uniform(0.0, [2e-3, 12.0], (hardened.sum(), 2))
     report = assert_alike_alone_and_among_others(law, stress, increment, state)
     assert report.failed == 2 and 200 < report.plastic < 780
 

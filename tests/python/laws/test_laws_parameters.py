@@ -17,7 +17,7 @@ PARTS = {
     "Hencky": {"law": SOIL},
     "Undrained": {"skeleton": SOIL},
 }
-RELATED = {"HardeningSoil": {"oedometer_modulus": 0.5}}
+RELATED = {"HardeningSoil": {"oedometer_modulus": 0.5, "small_strain_modulus": 2.0}}
 """Values that others of the same law bound"""
 CODE = {"PythonLaw", "Umat"}
 """Laws that call code of the user; what they need is tested with them."""
