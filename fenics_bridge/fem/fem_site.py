@@ -16,6 +16,7 @@ from fenics_bridge.fem.at_rest import rows_of, stress_at_rest, warn_beyond_stren
 from fenics_bridge.fem.load_steps import LoadStep
 from fenics_bridge.fem.loads import Load
 from fenics_bridge.fem.overconsolidation import hardened, upward
+from fenics_bridge.fem.small_strains import without_memory
 from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport, require_stages
 from fenics_bridge.fem.strength_ratio import STRENGTH, StrengthRatio, strengths, vertical_stress
@@ -100,6 +101,8 @@ class FemSite:
         if not fem.converged:
             raise StageError(self._failure(stage, steps), 1.0 - fem.load.held)
         self._harden(ratios)
+        if self.number == 1:
+            self._rest()
         iterations = sum(step.report.iterations for step in steps)
         return StageReport(self.number, stage.name, len(steps), iterations, self.largest_displacement())
 
@@ -229,6 +232,13 @@ class FemSite:
             rows, law = rows_of(self.fem, (tag,)), laws[tag]
             states = points.state[rows, : law.n_state]
             points.state[rows, : law.n_state] = hardened(law, points.stress[rows], states, ratio)
+
+    def _rest(self) -> None:
+        """Let the ground forget the small strains of its first stage."""
+        points = self.fem.points
+        for tag, law in self.fem.law_by_tag().items():
+            rows = rows_of(self.fem, (tag,))
+            points.state[rows, : law.n_state] = without_memory(law, points.state[rows, : law.n_state])
 
     def _laws(self, state: SiteState) -> Any:
         """The present laws, by tag: those of the stage, otherwise those that the body had before."""

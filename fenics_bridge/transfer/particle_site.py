@@ -14,6 +14,7 @@ from fenics_bridge.errors import InputError, agree, real_numbers
 from fenics_bridge.fem.at_rest import warn_beyond_strength
 from fenics_bridge.fem.fem_site import FemSite
 from fenics_bridge.fem.overconsolidation import hardened, upward
+from fenics_bridge.fem.small_strains import without_memory
 from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport
 from fenics_bridge.fem.strength_ratio import STRENGTH, StrengthRatio, strengths, vertical_stress
 from fenics_bridge.fem.supports import Support, not_supports
@@ -142,6 +143,8 @@ class ParticleSite:
         except mpm.RunError as error:
             raise StageError(self._failure(stage, error), float(getattr(error, "applied", 0.0))) from error
         self._harden(ratios)
+        if self.number == 1:
+            self._rest()
         p = model.particles
         moved = np.linalg.norm(p.displacement, axis=1).max(initial=0.0)
         return StageReport(
@@ -284,6 +287,15 @@ class ParticleSite:
             states[rows, : law.n_state] = hardened(law, p.stress[rows], states[rows, : law.n_state], ratio)
         if ratios:
             p.set("state", states)
+
+    def _rest(self) -> None:
+        """Let the ground forget the small strains of its first stage."""
+        p = self.model.particles
+        states = p.state.copy()
+        for number, law in enumerate(self.model.laws):
+            rows = p.material == number
+            states[rows, : law.n_state] = without_memory(law, states[rows, : law.n_state])
+        p.set("state", states)
 
     def _weigh(self, state: SiteState) -> None:
         """Scale masses by the ratio of the new unit weights to the old ones; undeformed volumes are not stored."""

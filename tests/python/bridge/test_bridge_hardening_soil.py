@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from bridge_cases import column, slope_model, top_of_column
-from hardening_soil_cases import sand
+from hardening_soil_cases import sand, small_strain_sand
 from mpi4py import MPI
+from stage_cases import ROLLERS, SOILS, mesh_of, site_of
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -75,3 +76,25 @@ def test_particles_take_over_stresses_and_hardening():
     report = model.explicit(until=0.2, nmd=True).last()
     assert report.kinetic_energy < 1e-9 * model.particles.mass.sum() * 9.81
     assert model.particles.stress == pytest.approx(before, abs=1e-3 * np.abs(before).max())
+
+
+@pytest.mark.parametrize("fem", [True, False], ids=["elements", "particles"])
+def test_ground_forgets_the_small_strains_of_its_first_stage_alone(fem, tmp_path):
+    mesh, soils = mesh_of("column", tmp_path), SOILS["column"]
+    laws = dict.fromkeys(soils, small_strain_sand(cohesion=1e3))
+    if fem:
+        site = site_of(mesh, laws)
+    else:
+        model = mpm.Model(bridge.background_mesh(*mesh), list(laws.values())[:1])
+        site = bridge.ParticleSite(model, dict.fromkeys(soils, 0), ROLLERS, small_displacements=True)
+    largest = []
+    for stage in (
+        bridge.Stage("ground", fill="ground", unit_weight={"ground": 20e3}),
+        bridge.Stage("load", pressure={"surface": 1e3}),
+    ):
+        site.carry_out(stage)
+        there = (site.fem.points if fem else model.particles).state
+        largest.append(there[:, laws["ground"].state_names.index("largest_small_strain")].max())
+        assert (largest[-1] > 0) == (np.abs(there[:, 4:]).max() > 0)
+    assert largest[0] == 0.0
+    assert 1e-6 < largest[1] < 1e-4

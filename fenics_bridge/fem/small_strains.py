@@ -1,0 +1,30 @@
+"""The small-strain memory of Hardening Soil, which natural ground has lost."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenics_bridge.types import Law
+
+MEMORY = ("largest_small_strain", "brick_")
+"""What the names of the state variables of the memory begin with"""
+
+
+def without_memory(law: Law, state: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The states of points that are as stiff in all directions as after a long rest.
+
+    The strains by which ground comes to equilibrium in its first stage are those of its deposition. Ages have passed since then, and its
+    stiffness at small strains has come back.
+
+    Args:
+        law: law of the points.
+        state: state variables, shape (n, n_state).
+
+    Returns:
+        State variables, shape (n, n_state): those of the memory are zero, others as they were.
+    """
+    columns = [number for number, name in enumerate(law.state_names) if name.startswith(MEMORY)]
+    rested = state.copy()
+    rested[:, columns] = 0.0
+    return rested
