@@ -49,7 +49,8 @@ ONLY_WITH = {
      "--coupling"): ("nor-sand",),
     ("--sanisand",): ("sanisand",),
     ("--secant-modulus", "--oedometer-modulus", "--unloading-modulus", "--unloading-poisson", "--stiffness-exponent",
-     "--normal-k0", "--failure-ratio", "--vertical-preconsolidation", "--reference-pressure"): ("hardening-soil",),
+     "--normal-k0", "--failure-ratio", "--vertical-preconsolidation", "--reference-pressure", "--small-strain-modulus",
+     "--threshold-strain"): ("hardening-soil",),
     ("--friction-angle", "--dilation-angle", "--tension-cutoff"): FRICTIONAL,
     ("--cohesion",): (*FRICTIONAL, "tresca", "von-mises"),
     ("--young",): tuple(name for name in MATERIALS if name not in ("cam-clay", "nor-sand", "sanisand", "hardening-soil")),
@@ -90,7 +91,8 @@ def add_law_options(
     for name, default, option in [("secant_modulus", 30e6, None), ("oedometer_modulus", 30e6, None), ("unloading_modulus", 90e6, None),
                                   ("poisson", 0.2, "--unloading-poisson"), ("exponent", 0.5, "--stiffness-exponent"),
                                   ("normal_k0", 0.0, None), ("failure_ratio", 0.9, None), ("vertical_preconsolidation", 0.0, None),
-                                  ("reference_pressure", 100e3, None)]:  # fmt: skip
+                                  ("reference_pressure", 100e3, None), ("small_strain_modulus", 0.0, None),
+                                  ("threshold_strain", 2e-4, None)]:  # fmt: skip
         add_parameter(p, mpm.HardeningSoil, name, default, "Hardening Soil: ", option)
     p.add_argument("--sanisand", nargs="*", default=[], metavar="NAME=VALUE",
                    help="SANISAND: parameters that differ from those of Toyoura sand, such as void_ratio=0.75 dilatancy=0.5; "
@@ -265,6 +267,7 @@ def _skeleton(a: argparse.Namespace) -> Any:
                 unloading_modulus=a.unloading_modulus, poisson=a.unloading_poisson, exponent=a.stiffness_exponent,
                 normal_k0=a.normal_k0, failure_ratio=a.failure_ratio,
                 vertical_preconsolidation=a.vertical_preconsolidation, reference_pressure=a.reference_pressure,
+                small_strain_modulus=a.small_strain_modulus, threshold_strain=a.threshold_strain,
             )  # fmt: skip
         case "sanisand":
             return sanisand_of(a.sanisand)

@@ -120,6 +120,7 @@ def without_effect(table: Mapping[str, Any]) -> list[str]:
     idle = idle - {"young", "poisson"} if kind == "umat" else idle | set(OF_UMAT)
     idle |= set(KINDS) - {kind} if kind in KINDS else set()
     idle |= set() if table.get("undrained", False) else {"water_modulus"}
+    idle |= set() if table.get("small_strain_modulus") else {"threshold_strain"}
     idle |= set() if has_ratio(table) else {RATIO, EXPONENT}
     idle |= set() if kind == "hardening-soil" or has_ratio(table) else {OVERCONSOLIDATION}
     return [key for key in table if key in idle]
@@ -230,7 +231,7 @@ def is_profile(value: dict) -> bool:
     return set(value) == {"value", "per_metre", "top"} and all(map(is_number, value.values()))
 
 
-MODULI = ("young", "secant_modulus", "oedometer_modulus", "unloading_modulus")
+MODULI = ("young", "secant_modulus", "oedometer_modulus", "unloading_modulus", "small_strain_modulus")
 STRESSES = ("vertical_preconsolidation", "reference_pressure")
 LEAST = dict.fromkeys(MODULI, 1e5) | dict.fromkeys(STRENGTHS, 50.0) | dict.fromkeys(STRESSES, 1e3)
 """Parameters [Pa] below which a soil of a site is probably given in kPa or MPa"""

@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import study_main  # noqa: F401
 from common.site.file import read_site
-from common.site.laws import law_at, unit_doubt
+from common.site.laws import idle_doubt, law_at, unit_doubt
 from common.stages.runs import carry_out
 from mpi4py import MPI
 
@@ -50,3 +51,26 @@ def test_moduli_in_kpa_are_doubted():
     assert "soils.sand: secant_modulus is 30000 Pa, which hardly any soil has" in unit_doubt(
         SAND | {"secant_modulus": 30e3}, "soils.sand"
     )
+
+
+def test_small_strain_stiffness_is_read_and_its_threshold_alone_is_doubted():
+    small = {"small_strain_modulus": 120e6, "threshold_strain": 1e-4}
+    law = law_at(SAND | small, None, "soils.sand")
+    assert (law.small_strain_modulus, law.threshold_strain) == (120e6, 1e-4)
+    assert not idle_doubt(SAND | small, "soils.sand")
+    assert "threshold_strain has no effect" in idle_doubt(SAND | {"threshold_strain": 1e-4}, "soils.sand")
+    assert "small_strain_modulus is 120 Pa" in unit_doubt(SAND | {"small_strain_modulus": 120.0}, "soils.sand")
+
+
+def test_small_strain_stiffness_makes_the_floor_rise_less_and_the_far_ground_stay(tmp_path):
+    """Far from the pit strains are small: there the stiffness is nearly that of very small strains."""
+    found = {}
+    for name, keys in (("usual", ""), ("small", "small_strain_modulus = 112.5e6\n")):
+        soils = ("ground", '"cut 1"', '"cut 2"', '"cut 3"')
+        text = f'extends = "{MESHES / "hardening_excavation"}.toml"\ncell_size = 2.0\n'
+        (tmp_path / "site.toml").write_text(text + "".join(f"[soils.{soil}]\n{keys}" for soil in soils))
+        run = carry_out(read_site(tmp_path / "site.toml", MPI.COMM_WORLD), 2, tmp_path, MPI.COMM_WORLD)
+        far = run.site.fem.evaluate_at(np.array([[25.0, 19.9]]))["displacement"][0, 1]
+        found[name] = run.rows[-1]["heave_m"], far
+    assert 0.6 < found["small"][0] / found["usual"][0] < 0.85
+    assert abs(found["small"][1]) < 0.4 * abs(found["usual"][1])  # G0 is three times that of unloading
