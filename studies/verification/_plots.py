@@ -31,6 +31,7 @@ def save_comparison(
     limits: tuple[tuple[float | None, float | None], tuple[float | None, float | None]] = ((None, None), (None, None)),
     joined: bool = False,
     equal: bool = False,
+    logarithmic: bool = False,
 ) -> None:
     """Draw computed points over expected lines.
 
@@ -41,8 +42,11 @@ def save_comparison(
         limits: of the axes; None to fit.
         joined: lines through the computed points, of which some dozen are marked.
         equal: one scale for both axes.
+        logarithmic: horizontal axis.
     """
     with curve_figure(path, (4.9, 3.4)) as axes:
+        if logarithmic:
+            axes.set_xscale("log")
         for k, (name, (x, y)) in enumerate(computed.items()):
             look = {
                 "marker": "os^vDP"[k % 6],
