@@ -117,10 +117,19 @@ The state variables are shear_hardening, the hardening shear strain less that of
 logarithm of the size of the cap over that of the start. Ground that is loaded from zero stress by its weight is
 normally consolidated, or less where vertical_preconsolidation is given, and so are points that begin with stresses;
 hardening_soil_state gives the states of overconsolidated ones. Increments are implicit, with elastic moduli that are secants between the stresses of start and end. The
-direction of plastic strains is that of the deviator of the stress. Small-strain stiffness is not part of the law.
+direction of plastic strains is that of the deviator of the stress.
+
+With a small_strain_modulus G0 the soil is stiffer while the strain since its last reversals is small, as of the HS-Brick
+law: G = G0 / (1 + 0.385 gamma / threshold_strain) in first loading, with gamma = e_1 - e_3 in triaxial directions (in
+simple shear sqrt(3)/2 of the engineering strain), until the tangent modulus is that of unloading; Masing's rule in
+unloading and reloading; the same Poisson's ratio; and plastic strains that are smaller by
+H_i = (G / G_ur)^(1 + E_ur / (2 E50)), where G is the smallest tangent modulus of the history. A small cycle leaves no
+trace. The states are then largest_small_strain and the distances of ten bricks that the strain drags along by strings,
+which are not turned with the soil: strains that turn it by much have long used them up.
 
 Source: Schanz, Vermeer, Bonnier (1999), Beyond 2000 in Computational Geotechnics, 281-296; Benz (2007), Small-strain
-stiffness of soils and its numerical consequences, University of Stuttgart, chapter 6.)")
+stiffness of soils and its numerical consequences, University of Stuttgart, chapter 6; Cudny, Truty (2020), Acta
+Geotechnica 15, 2031-2051.)")
       .def_readonly("strength_factor", &HardeningSoil::strength_factor, "What the strength is divided by");
   m.def(
       "hardened_to",
