@@ -43,7 +43,7 @@ FRICTIONAL = ("mohr-coulomb", "viscoplastic", "softening", "drucker-prager", "ha
 ONLY_WITH = {
     ("--viscosity",): ("viscoplastic",),
     ("--residual-cohesion", "--residual-friction-angle", "--softening-strain", "--reference-length"): ("softening",),
-    ("--compression-slope", "--swelling-slope", "--preconsolidation"): ("cam-clay",),
+    ("--compression-slope", "--swelling-slope", "--preconsolidation", "--creep", "--reference-time"): ("cam-clay",),
     ("--critical-slope", "--void-ratio", "--attraction"): ("cam-clay", "nor-sand"),
     ("--critical-void-ratio", "--critical-compression", "--dilatancy", "--hardening", "--rigidity", "--image-pressure",
      "--coupling"): ("nor-sand",),
@@ -82,7 +82,8 @@ def add_law_options(
         add_parameter(p, mpm.SofteningMohrCoulomb, name, default, "softening: ")
     for name, default, option in [("compression", 0.1, "--compression-slope"), ("swelling", 0.02, "--swelling-slope"),
                                   ("critical_slope", 1.0, None), ("void_ratio", 1.0, None),
-                                  ("preconsolidation", 20e3, None), ("attraction", 1e3, None)]:  # fmt: skip
+                                  ("preconsolidation", 20e3, None), ("attraction", 1e3, None), ("creep", 0.0, None),
+                                  ("reference_time", 86400.0, None)]:  # fmt: skip
         shared = name in ("critical_slope", "void_ratio", "attraction")
         add_parameter(p, mpm.CamClay, name, default, "Cam-Clay and NorSand: " if shared else "Cam-Clay: ", option)
     for name, default in [("critical_void_ratio", 1.0), ("critical_compression", 0.03), ("dilatancy", 4.0), ("hardening", 100.0),
@@ -252,7 +253,8 @@ def _skeleton(a: argparse.Namespace) -> Any:
         case "cam-clay":
             return mpm.CamClay(
                 compression=a.compression_slope, swelling=a.swelling_slope, critical_slope=a.critical_slope, poisson=a.poisson,
-                preconsolidation=a.preconsolidation, void_ratio=a.void_ratio, attraction=a.attraction,
+                preconsolidation=a.preconsolidation, void_ratio=a.void_ratio, attraction=a.attraction, creep=a.creep,
+                reference_time=a.reference_time,
             )  # fmt: skip
         case "nor-sand":
             return mpm.NorSand(

@@ -6,8 +6,8 @@ import numpy as np
 class Batch:
     """Points with stress, state, strain increment and tangent."""
 
-    def __init__(self, law, stress, strain, state=None):
-        self.law, self.strain = law, np.ascontiguousarray(strain)
+    def __init__(self, law, stress, strain, state=None, dt=np.inf):
+        self.law, self.strain, self.dt = law, np.ascontiguousarray(strain), dt
         self.start, self.start_state = stress, np.zeros((len(stress), law.n_state)) if state is None else state
         self.update()
 
@@ -17,7 +17,7 @@ class Batch:
     def updated(self, strain):
         stress, state = self.start.copy(), self.start_state.copy()
         tangent = np.zeros((*stress.shape, stress.shape[1]))
-        report = self.law.update(np.ascontiguousarray(strain), stress, state, tangent)
+        report = self.law.update(np.ascontiguousarray(strain), stress, state, tangent, dt=self.dt)
         return stress, state, tangent, report
 
     def differences(self, step):

@@ -1,24 +1,15 @@
 #include "materials/laws/cam_clay.h"
 
+#include "materials/laws/cam_clay_creep.h"
 #include "materials/tools/lode.h"
 #include "materials/tools/root.h"
-#include "materials/tools/secant.h"
 #include "materials/tools/side_by_side.h"
 
 namespace mpm::materials
 {
 namespace
 {
-/// The law with the constants of its returns worked out
-struct Clay
-{
-  double shear_ratio;          ///< G / K
-  double slope_squared;        ///< M^2
-  double swelling, difference; ///< kappa and lambda - kappa
-  double volume;               ///< specific volume at the law's start
-  double preconsolidation;     ///< p_c at the law's start, attraction included
-  double attraction;
-};
+using namespace cam_clay;
 
 Clay clay_of(const CamClay& law)
 {
@@ -28,45 +19,10 @@ Clay clay_of(const CamClay& law)
           law.compression - law.swelling,
           1 + law.void_ratio,
           law.preconsolidation + law.attraction,
-          law.attraction};
-}
-
-/// A point at the start of an increment, and the increment: pressures and volumetric strains are positive in
-/// compression here. Numbers of one point or, as `Lanes`, of a few side by side.
-template <class T>
-struct Start
-{
-  const Clay& clay;
-  T elastic, plastic;      ///< v / kappa and v / (lambda - kappa)
-  T pressure;              ///< p
-  T preconsolidation;      ///< p_c
-  T volumetric;            ///< volumetric strain increment
-  std::array<T, 3> square; ///< q^2 of the trial deviator s + 2 G e by 2 G, with the secant modulus G
-};
-
-/// What follows from the plastic part x of the volumetric strain and the plastic multiplier m
-template <class T>
-struct Result
-{
-  T x, multiplier;
-  T pressure, preconsolidation;
-  T shear, shear_by_y; ///< G, and its derivative by ln of the growth of the pressure
-  T square;            ///< q^2 of the trial
-  T ratio;             ///< of the deviator to that of the trial
-  T yield;             ///< yield function over the square of p_c at the start
-};
-
-template <class T>
-Result<T> result_of(const Start<T>& a, const T& x, const T& multiplier)
-{
-  const Growth<T> growth = growth_of<T>(a.elastic * (a.volumetric - x)), hardening = growth_of<T>(a.plastic * x);
-  const T modulus = a.clay.shear_ratio * a.elastic * a.pressure, shear = modulus * growth.mean;
-  const T p = a.pressure * growth.factor, pc = a.preconsolidation * hardening.factor;
-  const T square = polynomial<T>(a.square, 2 * shear), ratio = 1 / (1 + 6 * shear * multiplier / a.clay.slope_squared);
-  const T yield = ratio * ratio * square / a.clay.slope_squared + p * (p - pc);
-  return {x,      multiplier, p,
-          pc,     shear,      modulus * growth.slope,
-          square, ratio,      yield / (a.preconsolidation * a.preconsolidation)};
+          law.attraction,
+          law.creep > 0 ? (law.compression - law.swelling) / law.creep : 0.0,
+          law.creep / law.reference_time,
+          law.reference_time};
 }
 
 /// The two equations of a return, linearised: flow, x = m (2 p - p_c), and yield = 0
@@ -213,6 +169,25 @@ void write(const Start<T>& a, const Result<T>& r, const Deviators<D, T>& deviato
   add_to_state<D, T>(points, i, 2, -a.volumetric);
 }
 
+/// An increment of soil that creeps
+template <int D>
+Outcome creep_point(const Start<double>& a, const Result<double>& trial, const Deviators<D, double>& deviators,
+                    const PointBatch<D>& points, Index i, double* tangent)
+{
+  const std::optional<CreepAt> at = creep_solution(a, trial, std::isinf(points.dt) ? a.clay.reference_time : points.dt);
+  if (!at)
+    return Outcome::failed;
+  const Result<double> result = at->creeps ? creep_result(a, *at) : trial;
+  write(a, result, deviators, points, i);
+  if (tangent)
+  {
+    const auto [by_volume, by_q] = creep_slopes(a, *at);
+    write_secant_tangent<D>(secant_trial<D>(result.shear, deviators.stress, deviators.strain), deviators.strain,
+                            result.ratio, by_volume, by_q, tangent);
+  }
+  return at->creeps && at->log_flow > at->log_rate ? Outcome::plastic : Outcome::elastic;
+}
+
 template <int D>
 Outcome update_point(const Clay& clay, const PointBatch<D>& points, Index i, double* tangent)
 {
@@ -221,6 +196,8 @@ Outcome update_point(const Clay& clay, const PointBatch<D>& points, Index i, dou
   const Result<double> trial = result_of(a, 0.0, 0.0);
   if (!is_sound(a, trial))
     return Outcome::failed;
+  if (clay.creep_per_time > 0)
+    return creep_point(a, trial, deviators, points, i, tangent);
   Result<double> result = trial;
   const bool plastic = yields(trial);
   if (plastic && !newton(a, result, true))
@@ -235,6 +212,8 @@ Outcome update_point(const Clay& clay, const PointBatch<D>& points, Index i, dou
 template <int D>
 std::optional<Index> update_points(const Clay& clay, const PointBatch<D>& points, Index i)
 {
+  if (clay.creep_per_time > 0)
+    return {};
   Deviators<D, Lanes> deviators;
   const Start<Lanes> a = start_of(clay, points, i, deviators);
   Result<Lanes> result = result_of(a, Lanes{}, Lanes{});

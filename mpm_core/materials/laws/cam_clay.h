@@ -13,12 +13,21 @@ namespace mpm::materials
 /// The flow is associated; p_c hardens by dp_c / p_c = -v / (compression - swelling) de_v^p. Elasticity has the bulk
 /// modulus K = v p / swelling and a constant Poisson's ratio. The specific volume v is that at the start of each
 /// increment. Soil that loosens keeps a pressure of 1e-4 p_c of the start.
+///
+/// With creep mu no stress is inadmissible. With p_eq = p + q^2 / (M^2 p), the size of the ellipse through the stress,
+/// soil flows all the time, normal to that ellipse, by
+///     de_v^p / dt = mu / (v reference_time) (p_eq / p_c)^((compression - swelling) / mu) (1 - q^2 / (M^2 p^2)),
+/// so that under a constant stress v falls by mu for each factor e of time, and p_c is that of tests whose steps last
+/// the reference time. An increment without a duration lasts the reference time.
 /// Sources: Roscoe, Burland (1968), Engineering Plasticity, 535-609; Borja (1991), CMAME 92, 343-353 (the implicit
-/// return with secant moduli).
+/// return with secant moduli); creep: Vermeer, Neher (1999), Beyond 2000 in Computational Geotechnics, 249-261, with
+/// the multiplier of Sivasithamparam, Karstunen, Bonnier (2015), Comput. Geotech. 69, 46-57, in which the critical
+/// state is no singularity, for isotropic clay.
 struct CamClay
 {
   double compression, swelling, critical_slope, poisson, preconsolidation, void_ratio;
   double attraction = 0;
+  double creep = 0, reference_time = 86400;
 
   static constexpr auto parameters()
   {
@@ -37,6 +46,12 @@ struct CamClay
                      "isotropic tension at which stiffness and strength vanish; with 0 a point at zero pressure "
                      "has no stiffness, and its update fails",
                      0.0),
+        parameter<L>("creep", entry<&L::creep>, "-", at_least<L>(0),
+                     "slope mu of creep in specific volume and ln t, C_alpha / ln 10; 0 for none", 0.0),
+        parameter<L>("reference_time", entry<&L::reference_time>, "s", above<L>(0),
+                     "time after which the preconsolidation pressure is that of the tests, by default a day; without "
+                     "effect where there is no creep",
+                     86400.0),
     };
   }
 

@@ -64,20 +64,6 @@ Direction<T> direction_of(const Soil& soil, const T& cosine)
   return {largest - smallest, -smallest, largest + (soil.extension - 1) * middle - soil.extension * smallest};
 }
 
-/// exp(y) and (exp(y) - 1) / y, for a small y without a call of the library
-template <class T>
-struct Exponential
-{
-  T factor, mean;
-};
-
-template <class T>
-Exponential<T> exponential_of(const T& y)
-{
-  const Growth<Number<T>> growth = growth_of(value_of(y));
-  return {chained(y, growth.factor, growth.factor), chained(y, growth.mean, growth.slope)};
-}
-
 /// gamma of a stress on the hyperbola
 /// @param stress     s3 + a
 /// @param softness   t^-m of it

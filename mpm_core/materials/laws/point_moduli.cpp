@@ -112,7 +112,9 @@ struct LimitingModulus
   double operator()(const CamClay& law) const
   {
     const double preconsolidation = (law.preconsolidation + law.attraction) * std::exp(state[1]);
-    return moduli_of_bulk(bulk_per_pressure(law, state[2]) * (2 * preconsolidation - law.attraction), law.poisson)
+    const double carried = law.creep > 0 ? law.attraction - mean_stress : 0.0; // fast loading goes beyond it
+    const double most = 2 * std::max(preconsolidation, carried);
+    return moduli_of_bulk(bulk_per_pressure(law, state[2]) * (most - law.attraction), law.poisson)
         .p_wave;
   }
   double operator()(const NorSand& law) const

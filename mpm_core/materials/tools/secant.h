@@ -5,6 +5,7 @@
 
 #include "base/lanes.h"
 #include "materials/tools/deviator.h"
+#include "materials/tools/dual.h"
 
 #include <cmath>
 
@@ -54,6 +55,20 @@ Growth<T> growth_of(const T& y)
         growth.slope[l] = large.slope;
       }
   return growth;
+}
+
+/// exp(y) and (exp(y) - 1) / y, for a small y without a call of the library
+template <class T>
+struct Exponential
+{
+  T factor, mean;
+};
+
+template <class T>
+Exponential<T> exponential_of(const T& y)
+{
+  const Growth<Number<T>> growth = growth_of(value_of(y));
+  return {chained(y, growth.factor, growth.factor), chained(y, growth.mean, growth.slope)};
 }
 
 /// A trial deviator s + 2 G e and its q = sqrt(3 J2), where the secant modulus G depends on the end of the increment
