@@ -35,6 +35,8 @@ BODY = "#1d3a5f"
 MEMBER = "#c8401c"
 """Colour of structural members"""
 CURVES = ("#0b559f", "#c8401c", "#2a8a4a", "#7a4fa3", "#444444", "#d49a00")
+DASHES = ("-", "--", ":")
+"""Of curves that are more than there are colours"""
 WIDTH = 6.9  # in; a page's text width
 DISPLACEMENT = Quantity("Total displacement", "m", colours="viridis")
 SHEAR_STRAIN = Quantity("Accumulated plastic shear strain", "-", colours="inferno")
@@ -174,6 +176,11 @@ def save_mesh(path: Path, scene: Scene, position: np.ndarray, volume: np.ndarray
         save_figure(figure, path)
 
 
+def curve_look(number: int) -> dict[str, str]:
+    """Colour and dashes of a curve among others by its number."""
+    return {"color": CURVES[number % len(CURVES)], "linestyle": DASHES[number // len(CURVES) % len(DASHES)]}
+
+
 def save_history(
     path: Path,
     time: np.ndarray,
@@ -194,8 +201,8 @@ def save_history(
     """
     with curve_figure(path, (4.6, 3.0)) as axes:
         for k, (name, values) in enumerate(curves.items()):
-            style = "--" if name in dashed else "-"
-            axes.plot(time, values, style, color=CURVES[k % len(CURVES)], label=name)
+            look = curve_look(k) | ({"linestyle": "--"} if name in dashed else {})
+            axes.plot(time, values, label=name, **look)
         axes.set(xlabel="Time [s]", ylabel=label, xlim=(0, max(float(np.max(time, initial=0.0)), 1e-12)))
         if limits:
             axes.set_ylim(*limits)

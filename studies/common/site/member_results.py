@@ -19,7 +19,7 @@ import mpm_core as mpm
 
 from ..figures import Pictures, curve_figure
 from ..files import OutputError, write_text
-from ..plots import CURVES
+from ..plots import CURVES, curve_look
 from .keys import DAY
 
 COLUMNS = (
@@ -214,7 +214,7 @@ def save_axial_forces(path: Path, names: list[str], stages: list[StageForces]) -
     with curve_figure(path, (5.4, 3.4)) as axes:
         for k, name in enumerate(names):
             values = [1e-3 * largest(s.forces[name].axial_force) if name in s.forces else np.nan for s in shown]
-            axes.plot(range(len(shown)), values, "o-", color=CURVES[k % len(CURVES)], markersize=3.5, label=name)
+            axes.plot(range(len(shown)), values, marker="o", markersize=3.5, label=name, **curve_look(k))
         axes.set_xticks(range(len(shown)), [stage.name for stage in shown], rotation=25, ha="right")
         axes.set(xlabel="Stage", ylabel=axial_label(_dimension(stages)))
         axes.axhline(0, color="black", linewidth=0.5)

@@ -22,6 +22,7 @@ from ..page import Page
 from ..quiet import NOT_REACHED, without_warning
 from ..results import open_results
 from ..slope.fem import finite_elements, step_line
+from ..solids.member_forces import force_picture
 from ..solids.plots import captions_for, save_solid_mechanism
 from ..solids.site import solid_mechanism
 from ..summary import write_summary
@@ -30,7 +31,7 @@ from .field_plots import strength_pictures
 from .file import Site, read_site
 from .k0 import say_left_out
 from .member_results import captions as captions_of_members
-from .member_results import force_row, last_forces, member_pictures, write_members
+from .member_results import StageForces, force_row, last_forces, member_pictures, write_members
 from .mesh import cell_size_of
 from .water_table import level_line
 
@@ -106,7 +107,7 @@ def site_study(
     write_members(folder, forces, comm)
     if forces:
         summary["members_in_last_equilibrium"] = force_row(model.members, forces[0].forces)
-    drawn = {**_drawn(folder, sizes, runs, label, site, model), **strength_pictures(site, model, folder),
+    drawn = {**_drawn(folder, sizes, runs, label, site, model, forces), **strength_pictures(site, model, folder),
              **member_pictures(forces, folder)}  # fmt: skip
     said = []
     for row in rows:
@@ -125,9 +126,15 @@ def site_study(
 
 
 def _drawn(
-    folder: Path, sizes: list, runs: list[bridge.Collapse], label: str, site: Site, model: bridge.QuasiStatic
+    folder: Path,
+    sizes: list,
+    runs: list[bridge.Collapse],
+    label: str,
+    site: Site,
+    model: bridge.QuasiStatic,
+    forces: list[StageForces],
 ) -> Pictures:
-    """Mechanism on the finest mesh, the value over displacement, and convergence. Collective."""
+    """Mechanism on the finest mesh, the value over displacement, forces of members in a body, and convergence. Collective."""
     solid = site.dimension == 3
     body = solid_mechanism(model, runs[-1].mechanism) if solid else None
     field = None if solid else mechanism_field(runs[-1].mechanism, site.axisymmetric, model.cell_tags, model.off)
@@ -149,6 +156,8 @@ def _drawn(
         "value_displacement": lambda: save_curves(
             folder / "value_displacement.png", curves, ("Largest displacement [mm]", label), limits=((0, wide), (lowest, None))),
     }  # fmt: skip
+    if body is not None and forces:
+        pictures = {**pictures, **force_picture(body, forces[0].forces, "Last equilibrium", folder)}
     if None in sizes or len(sizes) < 2:
         return pictures
     return {**pictures, "convergence": lambda: save_convergence(folder / "convergence.png", sizes, values, label, None)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,24 +21,17 @@ from particle_player import boundary_edges
 from ..field_plots import INCREMENT, INCREMENT_SHEAR
 from ..figures import save_figure
 from ..plots import WIDTH, Quantity, paper_style
+from .members import draw_members, draw_members_of_section, hidden, member_legend
 from .site import Section, Solid, section_of
+from .view import AXES, MOST_INTERVALS, picture_axes, set_view
 
 LIGHT = LightSource(azdeg=225, altdeg=55).direction
 AMBIENT = 0.65
 """Brightness of what turns away from the light"""
-ELEVATION = 28.0
-"""Of the eye over the horizon [degrees]"""
 UPWARD = 0.2
 """Vertical part of the normal of a surface that is seen from above"""
 TURN = np.radians(30.0)
 """Angle between the normals of triangles beside a sharp edge"""
-TURNED, TURNED_AT_CORNER = 35.0, 10.0
-"""Angle between the eye and the direction to a side of a body, and to a corner [degrees]"""
-ZOOM = 0.86
-"""Of a body in its axes, so that the labels beside it stay within the picture"""
-MOST_INTERVALS = 4
-"""Between numbers along the longest side of a body"""
-AXES = ("$x$ [m]", "$y$ [m]", "$z$ [m]")
 
 
 CAPTIONS = {
@@ -46,6 +40,7 @@ CAPTIONS = {
     "stages_strain": "The body after each stage, and its section along the black line, by the strain accumulated since the displacements were reset",
     **dict.fromkeys(("random_cohesion", "random_friction_angle"), "Strength of the soils that is a random field, on the body and in the section along the black line"),
     "undrained_strength": "Undrained strength of the soils in which it follows the vertical effective stress, on the body and in the section along the black line",
+    "members": "Axial force of each structural member: its colour in the body, and its values along the member; tension is positive",
     "slide_displacement": "Displacement at the end of the slide: all particles, and those of a section through the one that has moved most",
     "slide_strain": "Accumulated plastic shear strain at the end of the slide: all particles, and those of a section through the one that has moved most",
 }  # fmt: skip
@@ -84,7 +79,10 @@ def save_solid_mechanism(path: Path, solid: Solid, title: str) -> None:
         draw_body(body, solid, moved, section, solid.side_to_see())
         body.set_title(title, loc="left", pad=0)
         axes = figure.add_subplot(1, 2, 2)
-        draw_section(axes, section, Shown(section.values / top, True, Normalize(0, 1), INCREMENT_SHEAR.colours))
+        draw_section(
+            axes, section, Shown(section.values / top, True, Normalize(0, 1), INCREMENT_SHEAR.colours), solid.members
+        )
+        member_legend(figure, solid.members)
         for below, quantity, extend in ((body, INCREMENT, "neither"), (axes, INCREMENT_SHEAR, "max")):
             draw_bar(figure, below, quantity, Normalize(0, 1), extend)
         save_figure(figure, path)
@@ -117,8 +115,9 @@ def save_solid_stages(
             draw_body(body, solid, Shown(values, by_cell, norm, quantity.colours), section, side)
             body.set_title(f"Stage: {name}", loc="left", pad=0)
             axes = figure.add_subplot(len(solids), 2, 2 * row + 2)
-            draw_section(axes, section, Shown(of_section, by_cell, norm, quantity.colours))
+            draw_section(axes, section, Shown(of_section, by_cell, norm, quantity.colours), solid.members)
             panels += [body, axes]
+        member_legend(figure, [line for one in solids for line in one.members])
         draw_bar(figure, panels, quantity, norm, "max", shrink=0.5)
         save_figure(figure, path)
 
@@ -163,17 +162,17 @@ def draw_body(axes: Any, solid: Solid, shown: Shown, section: Section, side: np.
     """
     triangles, behind = solid.surface()
     corners = solid.points[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    normal = solid.normals(triangles)
     light = AMBIENT + (1 - AMBIENT) * np.clip(normal @ LIGHT, 0.0, 1.0)
     of_face = shown.values[behind] if shown.by_cell else shown.values[triangles].mean(axis=1)
     rgba = plt.get_cmap(shown.colours)(shown.norm(of_face))
     rgba[:, :3] *= light[:, None]
     axes.add_collection3d(Poly3DCollection(corners, facecolors=rgba, edgecolors=rgba, linewidths=0.2, rasterized=True))
-    ridges = solid.points[sharp_edges(triangles, normal, eye(side))]
+    ridges = solid.points[sharp_edges(triangles, normal, picture_axes(side)[2])]
     axes.add_collection3d(Line3DCollection(ridges, colors="#808080", linewidths=0.5, zorder=5))
     set_view(axes, solid.points, side)
     _draw_cut(axes, corners[normal[:, 2] > UPWARD], section)
+    draw_members(axes, solid.members, partial(hidden, corners=corners, view=picture_axes(side)), solid.size())
 
 
 def sharp_edges(triangles: np.ndarray, normal: np.ndarray, towards: np.ndarray) -> np.ndarray:
@@ -193,41 +192,14 @@ def sharp_edges(triangles: np.ndarray, normal: np.ndarray, towards: np.ndarray) 
     return found
 
 
-def azimuth(side: np.ndarray) -> float:
-    """Of the eye [degrees] that sees a body from a side, or from a corner between two, a little from its left."""
-    return float(np.degrees(np.arctan2(side[1], side[0]))) - (TURNED if 0 in side else TURNED_AT_CORNER)
-
-
-def eye(side: np.ndarray) -> np.ndarray:
-    """Direction to the eye (3,)."""
-    turned, up = np.radians(azimuth(side)), np.radians(ELEVATION)
-    return np.array([np.cos(up) * np.cos(turned), np.cos(up) * np.sin(turned), np.sin(up)])
-
-
-def set_view(axes: Any, points: np.ndarray, side: np.ndarray) -> None:
-    """Equal axes around points (n, 3) [m], seen from the side to which a horizontal direction (2,) points."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=ZOOM)
-    axes.set_proj_type("ortho")
-    axes.view_init(elev=ELEVATION, azim=azimuth(side))
-    relative = (high - low) / (high - low).max()
-    for k, axis in enumerate((axes.xaxis, axes.yaxis, axes.zaxis)):
-        axis.set_label_text(AXES[k], fontsize=7)
-        axis.set_tick_params(labelsize=6, pad=-2)
-        slender = 1 - np.delete(relative, k).max()  # matplotlib measures distances along an axis by the other sides
-        axis.labelpad = (-6 if k == 2 else 0) + 16 * slender
-        most = max(1, round(MOST_INTERVALS * relative[k]))  # numbers on a short side would overlap
-        axis.set_major_locator(plt.MaxNLocator(most))
-
-
-def draw_section(axes: Axes, section: Section, shown: Shown) -> None:
-    """Draw a section by values of its points or triangles, with its outline."""
+def draw_section(axes: Axes, section: Section, shown: Shown, members: Sequence[np.ndarray] = ()) -> None:
+    """Draw a section by values of its points or triangles, with its outline; members: lines (k, 3) [m] of structural ones."""
     given: dict[str, Any] = {"facecolors": shown.values} if shown.by_cell else {"shading": "gouraud"}
     axes.tripcolor(*section.points.T, section.triangles, *(() if shown.by_cell else (shown.values,)), cmap=shown.colours, norm=shown.norm,
                    rasterized=True, **given)  # fmt: skip
     outline = section.points[boundary_edges(section.triangles)]
     axes.add_collection(LineCollection(outline, colors="black", linewidths=0.8))
+    draw_members_of_section(axes, members, section.axis, section.at, section.cell_size())
     axes.set(aspect="equal", xlabel=AXES[1 - section.axis], ylabel=AXES[2])
     axes.set_title(f"Section at {AXES[section.axis][:3]} = {section.at:.3g} m", loc="left", fontsize=8)
     axes.margins(0.03)

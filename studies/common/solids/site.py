@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,17 +25,23 @@ class Solid:
     """A displacement and a quantity of cells on tetrahedra, on the first rank.
 
     points: (n, 3) [m]; cells: (m, 4) rows of points; moved: displacement (n, 3) [m]; values: of the cells (m,), such as a strain [-]
+    members: lines (k, 3) [m] of structural members
     """
 
     points: np.ndarray
     cells: np.ndarray
     moved: np.ndarray
     values: np.ndarray
+    members: Sequence[np.ndarray] = ()
 
     def part(self, there: np.ndarray) -> Solid:
         """The solid of some of its cells; there: whether each of them is one (m,)."""
         kept, number = np.unique(self.cells[there], return_inverse=True)
-        return Solid(self.points[kept], number.reshape(-1, 4), self.moved[kept], self.values[there])
+        return Solid(self.points[kept], number.reshape(-1, 4), self.moved[kept], self.values[there], self.members)
+
+    def size(self) -> float:
+        """Length of the diagonal of a box around it [m]."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
     def lengths(self) -> np.ndarray:
         """Length of the displacement of each point: (n,)."""
@@ -52,6 +59,12 @@ class Solid:
         _, first, count = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True, return_counts=True)
         outer = np.sort(first[count == 1])
         return triangles[outer], outer // len(FACES)
+
+    def normals(self, triangles: np.ndarray) -> np.ndarray:
+        """Of triangles, rows of points (k, 3): unit vectors, outwards where the corners are against the clock seen from outside (k, 3)."""
+        corners = self.points[triangles]
+        normal: np.ndarray = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
 
     def place_that_moves_most(self) -> np.ndarray:
         """The point with the largest displacement (3,) [m]; of several alike the one in their middle."""
@@ -94,6 +107,11 @@ class Section:
     axis: int
     at: float
 
+    def cell_size(self) -> float:
+        """Length of a side of most triangles, about that of the cells [m]."""
+        ends = self.points[self.triangles[:, :2]]
+        return float(np.median(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)))
+
 
 def gathered_solid(function: Any, values: np.ndarray, there: np.ndarray) -> tuple[Solid, np.ndarray] | None:
     """A displacement of DOLFINx at the corners of all tetrahedra, and whether each is there; None but on the first rank. Collective.
@@ -119,7 +137,12 @@ def gathered_solid(function: Any, values: np.ndarray, there: np.ndarray) -> tupl
 def solid_mechanism(model: bridge.QuasiStatic, mechanism: Any) -> Solid | None:
     """A mechanism of finite elements, on the cells that are there; None but on the first rank. Collective."""
     found = gathered_solid(mechanism, shear_strain_of(mechanism), cells_there(model))
-    return None if found is None else found[0].part(found[1])
+    return None if found is None else replace(found[0].part(found[1]), members=member_lines(model))
+
+
+def member_lines(model: bridge.QuasiStatic) -> list[np.ndarray]:
+    """Lines (n, 3) [m] of the structural members of finite elements as they were installed."""
+    return [np.array(member.points, dtype=float) for member in model.members.values()]
 
 
 def cells_there(model: bridge.QuasiStatic) -> np.ndarray:

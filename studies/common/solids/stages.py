@@ -14,7 +14,7 @@ import fenics_bridge as bridge
 from ..figures import Pictures
 from ..stages.plots import MOVED, SHEAR, first_shown, movement_picture, own_cell_values
 from .plots import save_solid_stages
-from .site import Solid, gathered_solid
+from .site import Solid, gathered_solid, member_lines
 
 
 @dataclass
@@ -33,7 +33,10 @@ def solid_stage(site: bridge.FemSite, name: str) -> SolidStage | None:
     """The site as it is now; None but on the first rank. Collective."""
     material, strain, _ = (values[:, 0] for values in own_cell_values(site.fem))
     found = gathered_solid(site.fem.displacement, strain, material >= 0)
-    return None if found is None else SolidStage(name, *found)
+    if found is None:
+        return None
+    solid, there = found
+    return SolidStage(name, replace(solid, members=member_lines(site.fem)), there)
 
 
 def solid_stage_pictures(

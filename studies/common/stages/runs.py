@@ -20,6 +20,7 @@ from ..quiet import NOT_REACHED, without_warning
 from ..site.file import Site
 from ..site.member_results import StageForces, force_row, member_pictures, stage_forces, write_members
 from ..site.options import add_site_file
+from ..solids.member_forces import force_picture
 from ..solids.stages import solid_stage, solid_stage_pictures
 from .flow import flow_row, warn_of_heave
 from .plots import StageFiles, stage_picture, stage_pictures
@@ -47,10 +48,13 @@ class StageRun:
 
     def drawn(self, stages: Sequence[bridge.Stage], folder: Path) -> Pictures:
         """Pictures of the stages and of the structural members."""
-        draw: Callable[..., Pictures] = (
-            stage_pictures if self.site.fem.domain.topology.dim == 2 else solid_stage_pictures
-        )
-        return {**draw(stages, self.rows, self.pictures, folder), **member_pictures(self.forces, folder)}
+        solid = self.site.fem.domain.topology.dim == 3
+        draw: Callable[..., Pictures] = solid_stage_pictures if solid else stage_pictures
+        pictures = {**draw(stages, self.rows, self.pictures, folder), **member_pictures(self.forces, folder)}
+        last = [*zip(self.pictures, self.forces)][-1:] if solid else []
+        for stage, forces in last:
+            pictures |= force_picture(stage.solid.part(stage.there), forces.forces, f"Stage: {stage.name}", folder)
+        return pictures
 
 
 @without_warning(NOT_REACHED)  # said by the error
