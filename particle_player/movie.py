@@ -19,6 +19,7 @@ MOST_BYTES = 60e6
 """Largest size of a movie before it is packed; frames of a longer one are left out."""
 MOST_PARTICLES = 200_000
 """Largest number of particles in a movie; of more particles every second, third ... is drawn, larger."""
+PICTURE_AXES = ["across the picture [m]", "up the picture [m]"]
 
 Frame = Mapping[str, NDArray]
 
@@ -33,14 +34,22 @@ class Movie:
         frames: at least one, each with ``time`` [s] (or what else the slider shows), ``position`` (n, 2) [m], ``volume``
             (n,) [m^3 per metre], of a half section the area too, quantities by their keys (n,) in SI units, and ``id`` (n,)
             when rows change their order or number from frame to frame; ``bodies`` (k, 2, 2) are segments of rigid surfaces [m],
-            as many in each frame.
+            as many in each frame. With a view, positions and segments have three coordinates, ``volume`` is the area that a particle
+            covers in the picture (n,) [m^2], and ``light`` (n,) its brightness from 0 to 1, if it is given.
         quantities: those of the frames that can be chosen, by key.
+        view: of a body in three dimensions, rows of unit vectors to the right and upwards in the picture, and to the eye (3, 3);
+            the scene is then that of the picture.
     """
 
     title: str
     scene: Scene
     frames: Sequence[Frame]
     quantities: Mapping[str, Quantity]
+    view: NDArray[np.float64] | None = None
+
+    def in_picture(self, points: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Points (..., 2) of the plane as they are; those of a body (..., 3) [m] to the right and upwards in its picture (..., 2) [m]."""
+        return points if self.view is None else points @ self.view[:2].T
 
 
 def packed(movie: Movie) -> dict[str, Any]:
@@ -52,6 +61,7 @@ def packed(movie: Movie) -> dict[str, Any]:
     if not movie.frames:
         raise ValueError("frames is empty, expected at least one")
     frames, ids, every = _chosen(movie)
+    view = movie.view
     places = [_columns(frame, ids) for frame in frames]
 
     def over_time(values: Sequence[NDArray]) -> dict[str, Any]:
@@ -60,11 +70,16 @@ def packed(movie: Movie) -> dict[str, Any]:
             row[columns] = value[rows]
         return quantised(table)
 
+    across, up = zip(*(movie.in_picture(frame["position"]).T for frame in frames))
     fields = {
-        "x": over_time([frame["position"][:, 0] for frame in frames]),
-        "y": over_time([frame["position"][:, 1] for frame in frames]),
+        "x": over_time(across),
+        "y": over_time(up),
         "radius": over_time([0.5 * np.sqrt(every) * disc_diameter(frame["volume"]) for frame in frames]),
     }
+    if view is not None:
+        fields["depth"] = over_time([frame["position"] @ view[2] for frame in frames])
+    if "light" in frames[0]:
+        fields["light"] = over_time([frame["light"] for frame in frames])
     for key, quantity in movie.quantities.items():
         fields[key] = over_time([quantity.scale * frame[key] for frame in frames])
     return {
@@ -73,9 +88,15 @@ def packed(movie: Movie) -> dict[str, Any]:
         "count": len(ids),
         "ids": ids.tolist() if (ids != np.arange(len(ids))).any() else None,
         "fields": fields,
-        "bodies": [np.round(frame["bodies"].reshape(-1), 5).tolist() if "bodies" in frame else [] for frame in frames],
+        "bodies": [
+            np.round(movie.in_picture(frame["bodies"]).reshape(-1), 5).tolist() if "bodies" in frame else []
+            for frame in frames
+        ],
         "scene": _scene(movie.scene),
-        "axes": [label.replace("$", "") for label in axis_labels(movie.scene.half_section)],
+        "axes": PICTURE_AXES
+        if view is not None
+        else [label.replace("$", "") for label in axis_labels(movie.scene.half_section)],
+        "view": None if view is None else view.tolist(),
     }
 
 
@@ -88,7 +109,7 @@ def _chosen(movie: Movie) -> tuple[list[Frame], NDArray[np.int64], int]:
     ids = np.unique(np.concatenate([_ids(frame) for frame in movie.frames]))
     every = -(-len(ids) // MOST_PARTICLES)
     ids = ids[::every]
-    size = 2 * len(ids) * (3 + len(movie.quantities))
+    size = 2 * len(ids) * (3 + 2 * (movie.view is not None) + len(movie.quantities))
     skip = max(1, int(np.ceil(len(movie.frames) * size / MOST_BYTES)))
     return list(movie.frames)[::-1][::skip][::-1], ids, every  # counted backwards: the last frame always stays
 

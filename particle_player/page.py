@@ -124,9 +124,9 @@ def _text(name: str) -> str:
 def _data(movies: Sequence[Movie], slider: tuple[str, str]) -> dict[str, Any]:
     quantities = {key: quantity for movie in movies for key, quantity in movie.quantities.items()}
     limits = {key: colour_limits(q, _values(movies, key)) for key, q in quantities.items()}
-    bodies = [[frame["bodies"] for frame in movie.frames if "bodies" in frame] for movie in movies]
+    bodies = [[movie.in_picture(frame["bodies"]) for frame in movie.frames if "bodies" in frame] for movie in movies]
     corners = [
-        movie.scene.limits([frame["position"] for frame in movie.frames], segments)
+        movie.scene.limits([movie.in_picture(frame["position"]) for frame in movie.frames], segments)
         for movie, segments in zip(movies, bodies, strict=True)
     ]
     extent = (

@@ -55,19 +55,21 @@ class Scene:
         cells: (m, 3) rows of ``points``.
         is_soil: (m,) true for cells that held soil at the start; all if not given.
         half_section: whether the body is axisymmetric, about the axis x = 0.
+        outline: of the soil at the start, segments (k, 2, 2), m; the boundary of its cells if not given.
     """
 
     points: NDArray[np.float64]
     cells: NDArray[np.integer]
     is_soil: NDArray[np.bool_] | None = None
     half_section: bool = False
+    outline: NDArray[np.float64] | None = None
     boundary: NDArray[np.float64] = field(init=False, repr=False)
     initial_outline: NDArray[np.float64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         soil = self.cells if self.is_soil is None else self.cells[self.is_soil]
         self.boundary = self.points[boundary_edges(self.cells)]
-        self.initial_outline = self.points[boundary_edges(soil)]
+        self.initial_outline = self.points[boundary_edges(soil)] if self.outline is None else self.outline
 
     def limits(
         self, positions: Iterable[NDArray], bodies: Iterable[NDArray] = ()

@@ -224,8 +224,9 @@ class Player {
   describe(view, i) {
     const { k, fraction } = view.now, { fields, count, ids } = view.movie;
     const at = (name) => valueAt(fields[name], count, i, k, fraction);
-    const place = (name) => shown(at(name), 65534 * fields[name].step);
-    const lines = [`particle ${ids ? ids[i] : i}`, `at (${place("x")}, ${place("y")}) m`];
+    const along = placeIn(view.movie, ["x", "y", "depth"].map((name) => (fields[name] ? at(name) : 0)));
+    const place = along.map((value, axis) => shown(value, 65534 * fields[view.movie.view ? "x" : "xy"[axis]].step)).join(", ");
+    const lines = [`particle ${ids ? ids[i] : i}`, `at (${place}) m`];
     for (const [key, q] of Object.entries(this.data.quantities)) {
       if (fields[key]) lines.push(`${q.name}: ${withUnit(shown(at(key)), q.unit)}`);
     }
@@ -248,6 +249,12 @@ class Player {
     const within = (view, i) => (i < view.movie.count ? i : -1);
     for (const view of this.views) view.decorate(this.find("mesh").checked, within(view, this.marked), within(view, this.pinned));
   }
+}
+
+// Coordinates of a point of the picture: two in the plane, three of a body from its place in the picture and its depth.
+function placeIn(movie, [x, y, depth]) {
+  const view = movie.view;
+  return view ? [0, 1, 2].map((axis) => x * view[0][axis] + y * view[1][axis] + depth * view[2][axis]) : [x, y];
 }
 
 // The player with all movies at their end; null where there are none. What goes wrong is said on the page, too.

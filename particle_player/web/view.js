@@ -57,7 +57,9 @@ class View {
     const { x, y, radius } = this.movie.fields, field = this.movie.fields[key];
     const n = this.movie.count, r = this.ratio, at = k * n, next = fraction > 0 ? at + n : at;
     const [low, high] = this.limits[key], toColour = field ? 256 / (high - low) : 0;
-    for (let i = 0; i < n; i++) {
+    const order = this.backToFront(k), light = this.movie.fields.light;
+    for (let place = 0; place < n; place++) {
+      const i = order ? order[place] : place;
       const xa = x.values[at + i];
       if (xa === ABSENT) continue;
       const f = x.values[next + i] === ABSENT ? 0 : fraction, j = f > 0 ? next : at;
@@ -70,9 +72,22 @@ class View {
         const c = (value - low) * toColour;
         colour = colours[c < 0 ? 0 : c > 255 ? 255 : c | 0];
       }
+      if (light) colour = shaded(colour, light.low + light.step * light.values[at + i]);
       this.disc(px, py, size, colour, i);
     }
     this.context.putImageData(this.image, 0, 0);
+  }
+
+  // Particles of a body at frame k in the order of their depth, sorted by counting its 16 bits; null in the plane.
+  backToFront(k) {
+    const depth = this.movie.fields.depth, n = this.movie.count;
+    if (!depth || this.sorted?.k === k) return depth ? this.sorted.order : null;
+    const starts = new Uint32Array(65537), order = new Uint32Array(n);
+    for (let i = 0; i < n; i++) starts[depth.values[k * n + i] + 1]++;
+    for (let level = 0; level < 65536; level++) starts[level + 1] += starts[level];
+    for (let i = 0; i < n; i++) order[starts[depth.values[k * n + i]]++] = i;
+    this.sorted = { k, order };
+    return order;
   }
 
   disc(px, py, size, colour, i) {
@@ -190,5 +205,24 @@ class View {
     c.textAlign = "center";
     c.fillText(this.movie.axes[1], 0, 0);
     c.restore();
+    if (this.movie.view) this.directions(c);
   }
+
+  // The axes x, y and z of a body, in the upper right corner.
+  directions(c) {
+    const [right, up] = this.movie.view, x = this.width - MARGIN.right - 42, y = MARGIN.top + 42;
+    c.textAlign = "center";
+    ["x", "y", "z"].forEach((name, axis) => {
+      c.beginPath();
+      c.moveTo(x, y);
+      c.lineTo(x + 28 * right[axis], y - 28 * up[axis]);
+      c.stroke();
+      c.fillText(name, x + 36 * right[axis], y - 36 * up[axis] + 4);
+    });
+  }
+}
+
+function shaded(colour, light) {
+  const part = (shift) => Math.min(255, Math.round(light * ((colour >> shift) & 255))) << shift;
+  return ((255 << 24) | part(16) | part(8) | part(0)) >>> 0;
 }

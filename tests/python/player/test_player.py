@@ -66,6 +66,60 @@ def test_a_page_without_movies_or_frames_is_refused(tmp_path):
         parts_of_page([Movie("none", SCENE, [], {})])
 
 
+TURN = np.radians(30.0)
+VIEW = np.array([(-np.sin(TURN), np.cos(TURN), 0.0), (-0.5 * np.cos(TURN), -0.5 * np.sin(TURN), np.sqrt(0.75)),
+                 (np.sqrt(0.75) * np.cos(TURN), np.sqrt(0.75) * np.sin(TURN), 0.5)])  # fmt: skip
+"""From 30 degrees beside the x axis, and from 30 degrees above"""
+
+
+def body():
+    """Two particles behind one another as seen in the first frame, the nearer one first; in the second frame they have changed places."""
+    places = np.array([(1.0, 2.0, 3.0) + 4 * VIEW[2], (1.0, 2.0, 3.0)])
+    corners = np.array([(-2.0, -2.0), (4.0, -2.0), (4.0, 4.0), (-2.0, 4.0)])
+    scene = Scene(
+        corners, np.empty((0, 3), dtype=int), outline=np.stack([corners, np.roll(corners, 1, axis=0)], axis=1)
+    )
+    frames = [{"time": float(k), "position": places[:: 1 - 2 * k], "volume": np.full(2, 0.5), "speed": np.array([1.0, 0.0]),
+               "light": np.array([0.5, 1.0]), "bodies": np.array([[(0.0, 0.0, 0.0), (1.0, 2.0, 3.0)]])} for k in range(2)]  # fmt: skip
+    return Movie("body", scene, frames, {"speed": Quantity("Speed", "m/s")}, VIEW)
+
+
+def test_a_body_is_projected_onto_its_picture():
+    data = parts_of_page([body()]).data
+    (found,) = data["movies"]
+    x, y, depth, light = (unpacked(found["fields"][name], (2, 2)) for name in ("x", "y", "depth", "light"))
+    right, up, towards = VIEW @ (1.0, 2.0, 3.0)
+    assert x == pytest.approx(right) and y == pytest.approx(up)
+    assert depth == pytest.approx(towards + np.array([(4.0, 0.0), (0.0, 4.0)]), abs=1e-4)
+    assert light == pytest.approx(np.array([(0.5, 1.0)] * 2), abs=1e-4)
+    assert found["bodies"][0] == pytest.approx([0.0, 0.0, right, up], abs=1e-5)
+    assert found["view"] == VIEW.tolist() and found["scene"]["mesh"] == [] and len(found["scene"]["outline"]) == 16
+    assert (
+        data["extent"][0] == pytest.approx([-2.24, -2.24])
+        and parts_of_page([movie()]).data["movies"][0]["view"] is None
+    )
+
+
+@NEEDED
+def test_the_player_shows_the_nearer_particle_of_a_body_and_its_three_coordinates(tmp_path):
+    save_player(tmp_path / "page.html", [body()])
+    with started() as browser:
+        open_page(browser, tmp_path / "page.html")
+        assert browser.get_log("browser") == []
+        for step in (0, 1):
+            move_slider(browser, step)
+            shown = """const v = page.player.views[0], [x, y] = v.screenOf(0), r = v.ratio;
+                       const p = Math.round(y * r) * v.picture.width + Math.round(x * r);
+                       return [v.shownParticle[p], v.pixels[p] & 255, page.player.colours[v.shownParticle[p] === 0 ? 255 : 0] & 255];"""
+            particle, red, colour = browser.execute_script(shown)
+            assert particle == step and red == pytest.approx(colour * (0.5 if particle == 0 else 1.0), abs=1)
+            near = browser.execute_script(f"return page.player.describe(page.player.views[0], {step})").splitlines()[1]
+            numbers = [
+                float(text.replace("\N{MINUS SIGN}", "-")) for text in re.findall(r"[-\N{MINUS SIGN}\d.]+", near)
+            ]
+            assert numbers == pytest.approx((1.0, 2.0, 3.0) + 4 * VIEW[2], abs=2e-3)
+
+
 @NEEDED
 def test_a_page_of_its_own_shows_the_particles(tmp_path):
     save_player(tmp_path / "page.html", [movie(), movie()], "Two </script> & one", slider=("unit weight", "kN/m³"))
