@@ -18,12 +18,10 @@ import numpy as np
 from common.checks import say
 from common.interrupt import Interrupt
 from common.lengths import metres
-from common.movie import particle_movie
 from common.options import study_parser
 from common.page import Page
 from common.ranks import run_study
 from common.results import open_results
-from common.scenes import scene_of
 from common.site import slides
 from common.site.field_plots import CAPTIONS as STRENGTHS
 from common.site.field_plots import strength_pictures
@@ -153,7 +151,7 @@ def main(arguments: list[str] | None = None) -> int:
     model.particles.set("initial_position", model.particles.position)
     factor = 1.0 if failed_particles or (failed and begins_from_elements(site)) else a.factor
     weaken(site, model, factor)
-    scene = scene_of(model, sorted(site.laws))
+    ground = slides.ground_of(model, site.laws)
     with Interrupt(comm) as interrupt:
         result, stopped = slides.slide(a, model, folder, interrupt, pore_water(particles))
     moved = result.history["largest_displacement_m"][-1]
@@ -168,11 +166,11 @@ def main(arguments: list[str] | None = None) -> int:
     }  # fmt: skip
     drawn = {
         **(run.drawn(site.stages, folder) if a.pictures else {}),
-        **slides.slide_pictures(a, result, scene, folder),
+        **slides.slide_pictures(a, result, ground, folder),
         **(strength_pictures(site, run.site.fem, folder) if a.pictures else {}),
     }
     slide = f"strength divided by {factor:g}" if factor > 1 else "full strength"
-    movie = [particle_movie(slide, scene, result.frames)]
+    movie = [slides.slide_movie(slide, ground, result)]
     if comm.rank == 0:
         for who, message in (("finite elements", failed), ("particles", failed_particles)):
             if message:

@@ -76,7 +76,7 @@ def own_frame(model: mpm.Model, time: float, averaged: bool = False) -> dict[str
     return {
         "time": np.float64(time), "position": p["position"], "volume": area, "id": p["id"],
         "displacement": np.hypot(*p["displacement"].T), "shear_strain": p["plastic_strain"],
-        "vertical_stress": p["stress"][:, 1].copy(), "speed": np.hypot(*p["velocity"].T), **pore, **_bodies(model),
+        "vertical_stress": p["stress"][:, 1].copy(), "speed": np.hypot(*p["velocity"].T), **pore, **bodies_of(model),
     }  # fmt: skip
 
 
@@ -90,7 +90,7 @@ def averaged_where_known(model: mpm.Model, values: np.ndarray) -> np.ndarray:
     return np.where(np.isnan(values), np.nan, model.average_over_nodes(np.nan_to_num(values)))
 
 
-def _bodies(model: mpm.Model) -> dict[str, np.ndarray]:
+def bodies_of(model: mpm.Model) -> dict[str, np.ndarray]:
     """Rigid surfaces and structural members as segments, where there are any. Collective."""
     outlines = [contact.outline() for contact in model.contacts]
     segments = [points[cells] for points, cells in outlines]

@@ -17,6 +17,7 @@ from mpm_core.output import ModelOutput
 
 import fenics_bridge as bridge
 import mpm_core as mpm
+from particle_player import Movie
 
 from ..animation import save_animation
 from ..checks import say
@@ -34,8 +35,12 @@ from ..quiet import NOT_REACHED, without_warning
 from ..results import open_results
 from ..scenes import scene_of
 from ..schemes import add_particles_per_cell, add_pic
-from ..solids.particles import save_solid_particles, solid_frame
-from ..solids.plots import captions_for
+from ..solids.film import save_solid_film
+from ..solids.movie import ground_of as solid_ground
+from ..solids.movie import solid_movie
+from ..solids.particles import body_of, save_solid_particles, solid_frame
+from ..solids.plots import captions_for, outline_of
+from ..solids.site import Solid
 from ..summary import write_summary
 from .field_plots import CAPTIONS as STRENGTHS
 from .field_plots import strength_pictures
@@ -100,7 +105,21 @@ class Slide:
         solid = self.model.mesh.dim == 3
         frame = (solid_frame if solid else particle_frame)(self.model, report.time)
         if frame is not None:
-            self.frames = [*([] if solid else self.frames), frame]  # of a body the last one is drawn
+            for before in self.frames[-1:]:
+                before.pop("moved", None)  # of a body that of the last frame says from where it is seen
+            self.frames.append(frame)
+
+
+def ground_of(model: mpm.Model, soil_tags: Iterable[int]) -> Scene | Solid | None:
+    """The soil at the start: the mesh of a section, or the body; None but on the first rank. Collective."""
+    return (solid_ground if model.mesh.dim == 3 else scene_of)(model, sorted(soil_tags))
+
+
+def slide_movie(title: str, ground: Scene | Solid | None, result: Slide) -> Movie | None:
+    """The slide for the player of the page; None but on the first rank."""
+    if isinstance(ground, Solid):
+        return solid_movie(title, ground, result.frames)
+    return particle_movie(title, ground, result.frames)
 
 
 def energy_column(model: mpm.Model) -> str:
@@ -154,23 +173,23 @@ def slide(
     return result, None
 
 
-def slide_pictures(a: Namespace, result: Slide, scene: Scene | None, folder: Path) -> Pictures:
-    """Displacement and strain in the end, the largest displacement over time, and a film.
+def slide_pictures(a: Namespace, result: Slide, ground: Scene | Solid | None, folder: Path) -> Pictures:
+    """Displacement and strain in the end, the largest displacement over time, and a film: of a section by strain, of a body by displacement.
 
     Args:
         a: options with pictures and film.
+        ground: as `ground_of` gives it.
     """
-    solid = result.model.mesh.dim == 3
-    if not (result.frames if solid else scene) or not a.pictures:
+    if ground is None or not a.pictures:
         return {}
     last, history = result.frames[-1], result.history
     largest = history["largest_displacement_m"]
 
     def particles(name: str, key: str, quantity: Quantity) -> None:
-        if solid:
+        if isinstance(ground, Solid):
             save_solid_particles(folder / f"{name}.png", last, key, quantity)
         else:
-            save_particles(folder / f"{name}.png", scene, last["position"], last["volume"], last[key], quantity,
+            save_particles(folder / f"{name}.png", ground, last["position"], last["volume"], last[key], quantity,
                        title=f"$t$ = {last['time']:.1f} s", bodies=last.get("bodies"))  # fmt: skip
 
     pictures: dict[str, Callable] = {
@@ -184,9 +203,16 @@ def slide_pictures(a: Namespace, result: Slide, scene: Scene | None, folder: Pat
         pictures["member_forces"] = lambda: save_history(
             folder / "member_forces.png", history["time_s"], axial, axial_label(result.model.mesh.dim)
         )
-    if a.film and not solid:
-        pictures["film"] = lambda: save_animation(folder / "slide", scene, result.frames, "shear_strain", SHEAR_STRAIN)
+    if a.film:
+        pictures["film"] = lambda: _save_film(folder / "slide", ground, result.frames)
     return pictures
+
+
+def _save_film(path: Path, ground: Scene | Solid, frames: list[dict]) -> Path:
+    if isinstance(ground, Scene):
+        return save_animation(path, ground, frames, "shear_strain", SHEAR_STRAIN)
+    side = body_of(frames[-1]).side_to_see()
+    return save_solid_film(path, frames, "displacement", DISPLACEMENT, side, outline_of(ground, side))
 
 
 def _carry_weight(site: Site, fem: bridge.QuasiStatic, path: Path) -> None:
@@ -233,11 +259,11 @@ def site_slide(a: Namespace) -> int:
         "largest_displacement_m": moved, "particles": comm.allreduce(len(model.particles)),
         "wall_seconds": perf_counter() - start,
     }  # fmt: skip
-    scene = scene_of(model, sorted(site.laws))
-    movies = [particle_movie(f"strength divided by {a.factor:g}", scene, result.frames)]
+    ground = ground_of(model, site.laws)
+    movies = [slide_movie(f"strength divided by {a.factor:g}", ground, result)]
     said = f"strength divided by {a.factor:g}: largest displacement {metres(moved)} after {result.history['time_s'][-1]:.3g} s"
     page, pictures = Page(
         movies=movies, captions=captions_for({**CAPTIONS, **STRENGTHS}, site.dimension)
-    ), slide_pictures(a, result, scene, folder)
+    ), slide_pictures(a, result, ground, folder)
     code = write_summary(folder, a, summary, comm, page, {**pictures, **random}, said)
     return interrupt.exit_code or code

@@ -19,7 +19,10 @@ BELOW = 5e-3
 """Depth of a hidden point below the surface at least, over the diagonal of the body"""
 AT_ONCE = 2_000_000
 """Pairs of points and triangles that are compared at once"""
+MOST_SQUARES = 1500
+"""Along a picture, in which the nearest particles are found"""
 DASHES = (0, (2.2, 1.3))
+NO_MEMBERS = np.empty((0, 2, 3))
 
 Lines = Sequence[np.ndarray]
 
@@ -94,12 +97,18 @@ def hidden_by_particles(points: np.ndarray, particles: np.ndarray, size: float, 
     at, around = points @ view.T, particles @ view.T
     corner = np.minimum(at[:, :2].min(axis=0, initial=np.inf), around[:, :2].min(axis=0))
     # Squares that are a particle wide, with the depth of the nearest particle in each.
-    squares, columns = (np.floor((each[:, :2] - corner) / size).astype(int) for each in (around, at))
+    square = square_size(around[:, :2], size)
+    squares, columns = (np.floor((each[:, :2] - corner) / square).astype(int) for each in (around, at))
     shape = np.maximum(squares.max(axis=0), columns.max(axis=0, initial=0)) + 1
     nearest = np.full(shape, -np.inf)
     np.maximum.at(nearest, tuple(squares.T), around[:, 2])
     found: np.ndarray = nearest[tuple(columns.T)] > at[:, 2] + size
     return found
+
+
+def square_size(places: np.ndarray, size: float) -> float:
+    """Width of the squares into which places (n, 2) [m] are sorted: a size, but more where single ones are so far that squares would be too many."""
+    return max(size, float(np.ptp(places, axis=0).max()) / MOST_SQUARES)
 
 
 def joined(segments: np.ndarray) -> list[np.ndarray]:
@@ -158,9 +167,15 @@ def member_look(beside: bool) -> dict[str, Any]:
 
 def member_legend(figure: Any, members: Lines) -> None:
     """Name full and dashed lines of members above the panels of a figure, where there are some."""
-    if not len(members):
-        return
-    handles = [Line2D([], [], color=MEMBER, linewidth=1.6, label="structural members"),
-               Line2D([], [], color=MEMBER, linewidth=0.8, linestyle=DASHES, label="hidden by the soil, or beside the section")]  # fmt: skip
-    figure.get_layout_engine().set(rect=(0, 0, 1, 1 - 0.22 / figure.get_size_inches()[1]))
+    if len(members):
+        figure.get_layout_engine().set(rect=(0, 0, 1, 1 - 0.22 / figure.get_size_inches()[1]))
+        name_members(figure, "hidden by the soil, or beside the section")
+
+
+def name_members(figure: Any, dashed: str) -> None:
+    """Draw the legend of members at the top of a figure; dashed: what dashes mean."""
+    handles = [
+        Line2D([], [], color=MEMBER, linewidth=1.6, label="structural members"),
+        Line2D([], [], color=MEMBER, linewidth=0.8, linestyle=DASHES, label=dashed),
+    ]
     figure.legend(handles=handles, loc="upper right", ncol=2, fontsize=8, frameon=False, borderaxespad=0.2)

@@ -163,7 +163,7 @@ def draw_body(axes: Any, solid: Solid, shown: Shown, section: Section, side: np.
     triangles, behind = solid.surface()
     corners = solid.points[triangles]
     normal = solid.normals(triangles)
-    light = AMBIENT + (1 - AMBIENT) * np.clip(normal @ LIGHT, 0.0, 1.0)
+    light = brightness(normal)
     of_face = shown.values[behind] if shown.by_cell else shown.values[triangles].mean(axis=1)
     rgba = plt.get_cmap(shown.colours)(shown.norm(of_face))
     rgba[:, :3] *= light[:, None]
@@ -173,6 +173,19 @@ def draw_body(axes: Any, solid: Solid, shown: Shown, section: Section, side: np.
     set_view(axes, solid.points, side)
     _draw_cut(axes, corners[normal[:, 2] > UPWARD], section)
     draw_members(axes, solid.members, partial(hidden, corners=corners, view=picture_axes(side)), solid.size())
+
+
+def brightness(normal: np.ndarray) -> np.ndarray:
+    """Of surfaces with unit normals (..., 3), between 0 and 1: (...)."""
+    found: np.ndarray = AMBIENT + (1 - AMBIENT) * np.clip(normal @ LIGHT, 0.0, 1.0)
+    return found
+
+
+def outline_of(solid: Solid, side: np.ndarray) -> np.ndarray:
+    """Edges of a body at which its surface turns, as far as they are on the side that is seen: segments (k, 2, 3) [m]."""
+    triangles, _ = solid.surface()
+    edges: np.ndarray = solid.points[sharp_edges(triangles, solid.normals(triangles), picture_axes(side)[2])]
+    return edges
 
 
 def sharp_edges(triangles: np.ndarray, normal: np.ndarray, towards: np.ndarray) -> np.ndarray:

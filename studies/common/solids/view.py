@@ -23,11 +23,11 @@ def azimuth(side: np.ndarray) -> float:
     return float(np.degrees(np.arctan2(side[1], side[0]))) - (TURNED if 0 in side else TURNED_AT_CORNER)
 
 
-def set_view(axes: Any, points: np.ndarray, side: np.ndarray) -> None:
+def set_view(axes: Any, points: np.ndarray, side: np.ndarray, zoom: float = ZOOM) -> None:
     """Equal axes around points (n, 3) [m], seen from the side to which a horizontal direction (2,) points."""
     low, high = points.min(axis=0), points.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=ZOOM)
+    axes.set_box_aspect(high - low, zoom=zoom)
     axes.set_proj_type("ortho")
     axes.view_init(elev=ELEVATION, azim=azimuth(side))
     relative = (high - low) / (high - low).max()

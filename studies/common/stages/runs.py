@@ -51,7 +51,7 @@ class StageRun:
         solid = self.site.fem.domain.topology.dim == 3
         draw: Callable[..., Pictures] = solid_stage_pictures if solid else stage_pictures
         pictures = {**draw(stages, self.rows, self.pictures, folder), **member_pictures(self.forces, folder)}
-        last = [*zip(self.pictures, self.forces)][-1:] if solid else []
+        last = [each for each in zip(self.pictures, self.forces) if solid and each[1].forces][-1:]
         for stage, forces in last:
             pictures |= force_picture(stage.solid.part(stage.there), forces.forces, f"Stage: {stage.name}", folder)
         return pictures

@@ -90,7 +90,7 @@ def test_the_factor_of_safety_grows_between_abutments_that_are_close(tmp_path):
 
 
 def test_stages_and_the_slide_of_a_body(tmp_path):
-    """By finite elements, and by particles whose stages have the same stresses."""
+    """By finite elements, and by particles whose stages have the same stresses; with a film, and the player of the page."""
     path = variant(tmp_path, "cell_size = 3.0\n")
     options = ["--factor", 1.8, "--time", 1, "--frames", 2, "--output", tmp_path / "out"]
     assert study_main.main("embankment", ["--site", path, *options]) == 0
@@ -100,7 +100,8 @@ def test_stages_and_the_slide_of_a_body(tmp_path):
     for name in ("slide_displacement", "slide_strain", "stages_displacement", "stages_strain"):
         assert (tmp_path / "out" / f"{name}.png").stat().st_size > 20_000
     assert "kinetic_energy_J," in (tmp_path / "out" / "history.csv").read_text().splitlines()[0] + ","
-    assert not (tmp_path / "out" / "slide.mp4").exists()
+    assert [path.stat().st_size > 5000 for path in (tmp_path / "out").glob("slide.*")] == [True]  # the film
+    assert '"view":[[' in (tmp_path / "out" / "report.html").read_text()
 
 
 @pytest.mark.parametrize("text, message", [
