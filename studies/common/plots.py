@@ -37,6 +37,8 @@ MEMBER = "#c8401c"
 CURVES = ("#0b559f", "#c8401c", "#2a8a4a", "#7a4fa3", "#444444", "#d49a00")
 DASHES = ("-", "--", ":")
 """Of curves that are more than there are colours"""
+MOST_WITHIN, IN_A_COLUMN = 9, 20
+"""Names of curves within their axes, and in a column beside them, at most"""
 WIDTH = 6.9  # in; a page's text width
 DISPLACEMENT = Quantity("Total displacement", "m", colours="viridis")
 SHEAR_STRAIN = Quantity("Accumulated plastic shear strain", "-", colours="inferno")
@@ -181,6 +183,19 @@ def curve_look(number: int) -> dict[str, str]:
     return {"color": CURVES[number % len(CURVES)], "linestyle": DASHES[number // len(CURVES) % len(DASHES)]}
 
 
+def name_curves(axes: Axes, **look: object) -> None:
+    """Draw the legend of curves within their axes, or beside them where there are so many that it would hide them; look: of the former."""
+    count = len(axes.get_legend_handles_labels()[1])
+    beside = {
+        "loc": "upper left",
+        "bbox_to_anchor": (1.01, 1.01),
+        "fontsize": 7,
+        "ncol": -(-count // IN_A_COLUMN),
+        "columnspacing": 0.8,
+    }
+    axes.legend(**(beside if count > MOST_WITHIN else look))
+
+
 def save_history(
     path: Path,
     time: np.ndarray,
@@ -207,4 +222,4 @@ def save_history(
         if limits:
             axes.set_ylim(*limits)
         if len(curves) > 1:
-            axes.legend()
+            name_curves(axes)

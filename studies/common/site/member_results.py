@@ -19,7 +19,7 @@ import mpm_core as mpm
 
 from ..figures import Pictures, curve_figure
 from ..files import OutputError, write_text
-from ..plots import CURVES, curve_look
+from ..plots import CURVES, curve_look, name_curves
 from .keys import DAY
 
 COLUMNS = (
@@ -218,7 +218,7 @@ def save_axial_forces(path: Path, names: list[str], stages: list[StageForces]) -
         axes.set_xticks(range(len(shown)), [stage.name for stage in shown], rotation=25, ha="right")
         axes.set(xlabel="Stage", ylabel=axial_label(_dimension(stages)))
         axes.axhline(0, color="black", linewidth=0.5)
-        axes.legend(fontsize=8)
+        name_curves(axes, fontsize=8)
 
 
 def _save_bars(path: Path, forces: Mapping[str, float], dim: int) -> None:

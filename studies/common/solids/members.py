@@ -15,7 +15,7 @@ from ..plots import MEMBER
 
 PIECES = 200
 """Pieces of a line as long as a body of which each is seen or hidden"""
-BELOW = 5e-3
+BELOW = 1e-3
 """Depth of a hidden point below the surface at least, over the diagonal of the body"""
 AT_ONCE = 2_000_000
 """Pairs of points and triangles that are compared at once"""

@@ -6,6 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import study_main
+from common.plots import curve_look, name_curves
 from common.solids import member_forces
 from common.solids.members import DASHES, draw_members_of_section, hidden, hidden_by_particles, joined, parted
 from common.solids.plots import Shown, draw_body, main_section
@@ -151,5 +152,21 @@ def test_forces_are_drawn_along_members_in_kN_by_their_distance():
         member_forces._draw_along(axes, {"nail": force})
         assert axes.lines[0].get_xdata() == pytest.approx([0.0, 2.5, 2.5, 5.0])
         assert axes.lines[0].get_ydata() == pytest.approx([30.0, 30.0, 0.0, 0.0])
+    finally:
+        plt.close(figure)
+
+
+@pytest.mark.parametrize("count, beside", [(3, False), (25, True)])
+def test_many_curves_differ_and_are_named_beside_their_axes(count, beside):
+    figure, axes = plt.subplots(layout="constrained")
+    try:
+        for k in range(count):
+            axes.plot([0, 1], [0, k], label=f"nail {k}", **curve_look(k))
+        name_curves(axes, fontsize=8)
+        figure.canvas.draw()
+        legend, within = axes.get_legend().get_window_extent(), axes.get_window_extent()
+        assert (legend.x0 > within.x1) == beside and legend.x1 <= figure.bbox.x1 and legend.y0 >= 0
+        looks = [(line.get_color(), line.get_linestyle()) for line in axes.lines[:18]]
+        assert len(set(looks)) == len(looks)
     finally:
         plt.close(figure)
