@@ -27,7 +27,19 @@ end without overstress.)")
       R"(The state variable log_preconsolidation is the logarithm of the preconsolidation pressure over its initial
 value, attraction included in both; set it for points with another initial value. The time step follows from the
 modulus at twice the preconsolidation pressure. Soil that loosens keeps a pressure of 1e-4 of the preconsolidation
-pressure of the start, attraction included in both.)");
+pressure of the start, attraction included in both.
+
+With creep no stress is outside of the surface. With p_eq = p + q^2 / (M^2 p) the clay flows all the time, normal to
+the ellipse through its stress, by the volumetric strain rate
+
+    creep / (v reference_time) (p_eq / p_c)^((compression - swelling) / creep) (1 - q^2 / (M^2 p^2)),
+
+so that under constant stress its specific volume v falls by creep for each factor e of time, and fast loading meets
+more strength: at the same volume by the ratio of the rates to the power creep / compression. Increments without a
+duration, as those of stages of construction, are of the law without creep.
+
+Source: Vermeer, Neher (1999), Beyond 2000 in Computational Geotechnics, 249-261; the multiplier is that of
+Sivasithamparam, Karstunen, Bonnier (2015), Comput. Geotech. 69, 46-57, for isotropic clay.)");
   bind_law<NorSand>(m, "NorSand",
                     "NorSand: a critical state law for sand, silt and tailings, loose (static liquefaction) or dense.",
                     R"(With p = attraction - mean stress, q = sqrt(3 J2), void ratio e and image pressure p_i:

@@ -21,8 +21,7 @@ Clay clay_of(const CamClay& law)
           law.preconsolidation + law.attraction,
           law.attraction,
           law.creep > 0 ? (law.compression - law.swelling) / law.creep : 0.0,
-          law.creep / law.reference_time,
-          law.reference_time};
+          law.creep / law.reference_time};
 }
 
 /// The two equations of a return, linearised: flow, x = m (2 p - p_c), and yield = 0
@@ -169,12 +168,15 @@ void write(const Start<T>& a, const Result<T>& r, const Deviators<D, T>& deviato
   add_to_state<D, T>(points, i, 2, -a.volumetric);
 }
 
+/// Whether soil creeps in increments of this duration
+bool creeps(const Clay& clay, double dt) { return clay.creep_per_time > 0 && std::isfinite(dt); }
+
 /// An increment of soil that creeps
 template <int D>
 Outcome creep_point(const Start<double>& a, const Result<double>& trial, const Deviators<D, double>& deviators,
                     const PointBatch<D>& points, Index i, double* tangent)
 {
-  const std::optional<CreepAt> at = creep_solution(a, trial, std::isinf(points.dt) ? a.clay.reference_time : points.dt);
+  const std::optional<CreepAt> at = creep_solution(a, trial, points.dt);
   if (!at)
     return Outcome::failed;
   const Result<double> result = at->creeps ? creep_result(a, *at) : trial;
@@ -196,7 +198,7 @@ Outcome update_point(const Clay& clay, const PointBatch<D>& points, Index i, dou
   const Result<double> trial = result_of(a, 0.0, 0.0);
   if (!is_sound(a, trial))
     return Outcome::failed;
-  if (clay.creep_per_time > 0)
+  if (creeps(clay, points.dt))
     return creep_point(a, trial, deviators, points, i, tangent);
   Result<double> result = trial;
   const bool plastic = yields(trial);
@@ -212,7 +214,7 @@ Outcome update_point(const Clay& clay, const PointBatch<D>& points, Index i, dou
 template <int D>
 std::optional<Index> update_points(const Clay& clay, const PointBatch<D>& points, Index i)
 {
-  if (clay.creep_per_time > 0)
+  if (creeps(clay, points.dt))
     return {};
   Deviators<D, Lanes> deviators;
   const Start<Lanes> a = start_of(clay, points, i, deviators);

@@ -18,7 +18,7 @@ namespace mpm::materials
 /// soil flows all the time, normal to that ellipse, by
 ///     de_v^p / dt = mu / (v reference_time) (p_eq / p_c)^((compression - swelling) / mu) (1 - q^2 / (M^2 p^2)),
 /// so that under a constant stress v falls by mu for each factor e of time, and p_c is that of tests whose steps last
-/// the reference time. An increment without a duration lasts the reference time.
+/// the reference time. An increment without a duration is one of the law without creep.
 /// Sources: Roscoe, Burland (1968), Engineering Plasticity, 535-609; Borja (1991), CMAME 92, 343-353 (the implicit
 /// return with secant moduli); creep: Vermeer, Neher (1999), Beyond 2000 in Computational Geotechnics, 249-261, with
 /// the multiplier of Sivasithamparam, Karstunen, Bonnier (2015), Comput. Geotech. 69, 46-57, in which the critical
@@ -49,8 +49,8 @@ struct CamClay
         parameter<L>("creep", entry<&L::creep>, "-", at_least<L>(0),
                      "slope mu of creep in specific volume and ln t, C_alpha / ln 10; 0 for none", 0.0),
         parameter<L>("reference_time", entry<&L::reference_time>, "s", above<L>(0),
-                     "time after which the preconsolidation pressure is that of the tests, by default a day; without "
-                     "effect where there is no creep",
+                     "duration of the load steps of the tests that gave the preconsolidation pressure, by default a "
+                     "day; without effect where there is no creep",
                      86400.0),
     };
   }

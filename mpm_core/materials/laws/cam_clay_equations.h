@@ -19,7 +19,6 @@ struct Clay
   double attraction;
   double exponent;       ///< (lambda - kappa) / mu of creep
   double creep_per_time; ///< mu / reference time; 0 without creep
-  double reference_time;
 };
 
 /// A point at the start of an increment, and the increment: pressures and volumetric strains are positive in
