@@ -8,7 +8,7 @@ the same to Newton's method.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -40,8 +40,9 @@ def reconfigure(
     law: Any,
     members: Any = None,
     parameters: Mapping[str, NDArray[np.float64]] | None = None,
+    harden: Callable[[], None] | None = None,
 ) -> None:
-    """Apply the changes of `QuasiStatic.reconfigure`; parameters: new values of those that vary, as for `take_over`."""
+    """Apply the changes of `QuasiStatic.reconfigure`; parameters and harden: as for `take_over`."""
     domain, points, before = model.domain, model.points, model.laws
     off = model.off if off is None else off
     off = tag_numbers(domain.comm, model.cell_tags, off, "off", "cell") if len(off) else ()
@@ -57,7 +58,7 @@ def reconfigure(
     new = was_off & np.repeat(there.x.array[points.cells] > 0, points.per_cell)
     given = given_stress(model, stress, new)
     points.assign(np.where(there.x.array[: owned_cells(domain)] > 0, model._materials.number, -1), len(laws))
-    take_over(model, new, laws, before, given, parameters)
+    take_over(model, new, laws, before, given, parameters, harden)
     model.law, model.off = law, off
     _support(model, model.supports if supports is None else tuple(supports), there)
     space = model.displacement.function_space
@@ -98,10 +99,12 @@ def take_over(
     before: Any,
     given: Any,
     parameters: Mapping[str, NDArray[np.float64]] | None = None,
+    harden: Callable[[], None] | None = None,
 ) -> None:
     """Stress and state of the points under the new laws: removed soil has none, new soil starts from its initial state.
 
     parameters: values (n,) of laws' parameters that vary, by name, which the points have from now on; NaN where they keep theirs
+    harden: gives new points the state variables of their history, before their stresses are brought inside of the strength
     """
     points = model.points
     points.stress[points.off], points.state[points.off], points.deviatoric_strain[points.off] = 0.0, 0.0, 0.0
@@ -111,6 +114,8 @@ def take_over(
     changed = np.array([one is not other for one, other in zip(laws, before)])
     other = (of_point >= 0) & (new | changed[np.maximum(of_point, 0)])
     points.reset_state(laws, np.flatnonzero(other))
+    if harden is not None:
+        harden()
     for name, values in (parameters or {}).items():
         points.set_parameter(laws, name, values)
         other |= ~np.isnan(values)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,9 @@ from fenics_bridge.fem.active_cells import cells_there, reconfigure, switch_off
 from fenics_bridge.fem.at_rest import rows_of, stress_at_rest, warn_beyond_strength
 from fenics_bridge.fem.load_steps import LoadStep
 from fenics_bridge.fem.loads import Load
-from fenics_bridge.fem.overconsolidation import hardened, upward
-from fenics_bridge.fem.small_strains import without_memory
+from fenics_bridge.fem.overconsolidation import before_equilibrium, hardened, upward
 from fenics_bridge.fem.quasi_static import QuasiStatic
+from fenics_bridge.fem.small_strains import without_memory
 from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport, require_stages
 from fenics_bridge.fem.strength_ratio import STRENGTH, StrengthRatio, strengths, vertical_stress
 from fenics_bridge.mesh.names import known_tags, label, tag_numbers
@@ -100,7 +101,7 @@ class FemSite:
         self.number += 1
         if not fem.converged:
             raise StageError(self._failure(stage, steps), 1.0 - fem.load.held)
-        self._harden(ratios)
+        self._harden(ratios, fem.law_by_tag())
         if self.number == 1:
             self._rest()
         iterations = sum(step.report.iterations for step in steps)
@@ -167,16 +168,17 @@ class FemSite:
     def _begin(self, stage: Stage, state: SiteState) -> Load:
         """Make the changes of a stage, which leads to a state; returns the state's load, which does not act yet."""
         fem, laws, before = self.fem, self._laws(state), self.state.there
-        k0, ratios = state.k0_of(stage), state.strength_ratio_of(stage, laws)
+        k0, weak = state.k0_of(stage), state.strength_ratio_of(stage, laws)
         given, carried = (
             stress_at_rest(fem, state, self._off(state.there), laws, k0, before) if k0 else (None, fem.points.stress)
         )
-        strength = self._strength(ratios, laws, carried)
+        strength = self._strength(weak, laws, carried)
         if stage.reset_displacement:
             fem.reset_displacement()
         if replaced := set(stage.remove).intersection(stage.install):
             fem.reconfigure(members={name: one for name, one in fem.members.items() if name not in replaced})
-        load = self._enter(state, stage.stress if given is None else given, strength)
+        ratios = before_equilibrium(state.overconsolidation_of(stage, laws), laws)
+        load = self._enter(state, stage.stress if given is None else given, strength, ratios)
         if given is not None:
             rows = rows_of(fem, k0)
             warn_beyond_strength(fem.domain.comm, f"stage {stage.name!r}: ", given[rows], fem.points.stress[rows])
@@ -210,6 +212,7 @@ class FemSite:
         state: SiteState,
         stress: OfPosition | NDArray[np.float64] | None = None,
         strength: NDArray[np.float64] | None = None,
+        ratios: Mapping[int, float] | None = None,
     ) -> Load:
         """Change the body to a state; returns the state's load, which does not act yet.
 
@@ -217,17 +220,19 @@ class FemSite:
             state: the state.
             stress: of soils that are placed.
             strength: cohesion (n,) [Pa] of the points from now on, NaN where it stays; None where all stay.
+            ratios: overconsolidation ratios [-] that soils have before they come to equilibrium, by tag.
         """
         off, parameters = self._off(state.there), {} if strength is None else {STRENGTH: strength}
         laws, members = self._laws(state), of_members(state.members)
-        reconfigure(self.fem, off, state.supports, state.pore_pressure, stress, laws, members, parameters)
+        harden = partial(self._harden, ratios or {}, laws)
+        reconfigure(self.fem, off, state.supports, state.pore_pressure, stress, laws, members, parameters, harden)
         self.state = state
         moved = any(v for s in state.supports for v in (s.displacement or ()) if v)
         return Load({tag: state.unit_weight[tag] for tag in state.there}, state.pressure, float(moved))
 
-    def _harden(self, ratios: Mapping[int, float]) -> None:
-        """Give the points of soils the hardening of overconsolidation ratios [-], by tag, under their present stresses."""
-        points, laws = self.fem.points, self.fem.law_by_tag()
+    def _harden(self, ratios: Mapping[int, float], laws: Mapping[int, Law]) -> None:
+        """Give the points of soils the hardening of overconsolidation ratios [-] under their present stresses; ratios and laws by tag."""
+        points = self.fem.points
         for tag, ratio in ratios.items():
             rows, law = rows_of(self.fem, (tag,)), laws[tag]
             states = points.state[rows, : law.n_state]

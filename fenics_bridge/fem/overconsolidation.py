@@ -22,14 +22,20 @@ EXCESS = "excess_pore_pressure"
 """State variable of laws whose stress is the total one"""
 
 
-def hardening_soil_in(law: Law) -> mpm.HardeningSoil | None:
-    """The HardeningSoil that a law is, or that `Undrained` and `Hencky` are made of; None of others, and where its parameters vary."""
+def soil_with_history(law: Law) -> mpm.HardeningSoil | mpm.CamClay | None:
+    """The HardeningSoil or CamClay that a law is, or that `Undrained` and `Hencky` are made of; None of others, and where its parameters vary."""
     each = list(with_inner_laws(law))
     varies = any(isinstance(one, mpm.Heterogeneous) for one in each)
-    return each[-1] if isinstance(each[-1], mpm.HardeningSoil) and not varies else None
+    return each[-1] if isinstance(each[-1], mpm.HardeningSoil | mpm.CamClay) and not varies else None
 
 
-def require_hardening_soil(
+def hardening_soil_in(law: Law) -> mpm.HardeningSoil | None:
+    """The HardeningSoil of `soil_with_history`; None of other laws."""
+    soil = soil_with_history(law)
+    return soil if isinstance(soil, mpm.HardeningSoil) else None
+
+
+def require_history(
     comm: MPI.Comm, where: str, laws: Mapping[int, Law], ratios: Mapping[int, float], name_of: Any
 ) -> None:
     """Require laws that an overconsolidation ratio has an effect on. Collective.
@@ -45,22 +51,22 @@ def require_hardening_soil(
         InputError: the law of a soil is another one. Raised on all ranks alike.
     """
     problems = (
-        f"{where}overconsolidation is {ratio:g} for the soil {name_of(tag)}, whose law is {laws[tag].name}, expected HardeningSoil with the same "
-        "parameters at all points"
+        f"{where}overconsolidation is {ratio:g} for the soil {name_of(tag)}, whose law is {laws[tag].name}, expected HardeningSoil or CamClay with "
+        "the same parameters at all points"
         for tag, ratio in ratios.items()
-        if hardening_soil_in(laws[tag]) is None
+        if soil_with_history(laws[tag]) is None
     )
     agree(comm, next(problems, None))
 
 
 def hardened(law: Law, stress: NDArray[np.float64], state: NDArray[np.float64], ratio: float) -> NDArray[np.float64]:
-    """The states of points of Hardening Soil after a larger vertical stress than the present one.
+    """The states of points of soil after a larger vertical stress than the present one.
 
-    Hardening is at least that of level ground which has been normally consolidated to the vertical effective stress times the ratio, and that
-    which the stress itself needs.
+    Hardening is that of level ground which has been normally consolidated to the vertical effective stress times the ratio, and at least that
+    which the stress itself needs; of HardeningSoil also at least the present one.
 
     Args:
-        law: HardeningSoil, or what is made of it.
+        law: HardeningSoil or CamClay, or what is made of it.
         stress: present stress [Pa], tension positive, shape (n, S); the last axis of the space points up.
         state: state variables, shape (n, n_state).
         ratio: largest vertical effective stress before over the present one, OCR [-].
@@ -68,16 +74,47 @@ def hardened(law: Law, stress: NDArray[np.float64], state: NDArray[np.float64], 
     Returns:
         State variables, shape (n, n_state).
     """
-    soil, names, result = hardening_soil_in(law), law.state_names, state.copy()
+    soil, names, result = soil_with_history(law), law.state_names, state.copy()
     effective, up = effective_stress(law, stress, state), upward(stress.shape[1])
     level = np.zeros_like(stress)  # its largest principal stress is the vertical one, whatever K0 of the ground
     level[:, :3] = normal_k0(soil) * np.minimum(effective[:, up], 0.0)[:, None]
     level[:, up] = np.minimum(effective[:, up], 0.0)
+    if isinstance(soil, mpm.CamClay):
+        size = np.maximum(yield_size(soil, ratio * level), yield_size(soil, effective))
+        result[:, names.index("log_preconsolidation")] = np.log(size / (soil.preconsolidation + soil.attraction))
+        return result
     for found in (mpm.hardening_soil_state(soil, level, ratio), mpm.hardening_soil_state(soil, effective)):
         for name, values in found.items():
             column = names.index(name)
             result[:, column] = np.maximum(result[:, column], values)
     return result
+
+
+def before_equilibrium(ratios: Mapping[int, float], laws: Mapping[int, Law]) -> dict[int, float]:
+    """The overconsolidation ratios [-] of CamClay, by tag: with less history its points could not keep the stress that they are placed with.
+
+    Args:
+        ratios: by tag.
+        laws: by tag.
+    """
+    return {tag: ratio for tag, ratio in ratios.items() if isinstance(soil_with_history(laws[tag]), mpm.CamClay)}
+
+
+LEAST_PRESSURE = 1.0
+"""Pressure [Pa], attraction included, that the yield surface of a point of CamClay has at least"""
+
+
+def yield_size(soil: mpm.CamClay, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Preconsolidation pressures (n,) [Pa], attraction included, whose yield surfaces pass through stresses (n, S).
+
+    Args:
+        soil: the clay.
+        stress: effective stress [Pa], tension positive, shape (n, S).
+    """
+    mean = stress[:, :3].mean(axis=1)
+    squares = ((stress[:, :3] - mean[:, None]) ** 2).sum(axis=1) + 2 * (stress[:, 3:] ** 2).sum(axis=1)
+    pressure = np.maximum(soil.attraction - mean, LEAST_PRESSURE)
+    return pressure + 1.5 * squares / (soil.critical_slope**2 * pressure)
 
 
 def effective_stress(law: Law, stress: NDArray[np.float64], state: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -100,5 +137,7 @@ def upward(size: int) -> int:
 
 
 def normal_k0(law: Any) -> float:
-    """K0 of normally consolidated soil of a HardeningSoil [-]."""
+    """K0 of normally consolidated soil [-]: of a HardeningSoil its own, of a CamClay 1 - sin(phi) of the critical state (Jaky 1944)."""
+    if isinstance(law, mpm.CamClay):
+        return 1 - 3 * law.critical_slope / (6 + law.critical_slope)
     return float(law.normal_k0) or 1 - math.sin(math.radians(law.friction_angle))

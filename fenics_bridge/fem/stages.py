@@ -14,7 +14,7 @@ from mpm_core.members import Member
 
 from fenics_bridge.errors import InputError, agree, is_finite
 from fenics_bridge.fem.k0 import LARGEST_K0, Surface, surface_height
-from fenics_bridge.fem.overconsolidation import LARGEST, require_hardening_soil
+from fenics_bridge.fem.overconsolidation import LARGEST, require_history
 from fenics_bridge.fem.strength_ratio import StrengthRatio, require_cohesive
 from fenics_bridge.fem.supports import Support
 from fenics_bridge.types import Law, OfPosition
@@ -316,7 +316,7 @@ class SiteState:
         """
         where = f"stage {stage.name!r}: "
         ratios = self._by_soil(where + "overconsolidation", stage.overconsolidation)
-        require_hardening_soil(self._comm, where, laws, ratios, self._name_of)
+        require_history(self._comm, where, laws, ratios, self._name_of)
         return ratios
 
     def strength_ratio_of(self, stage: Stage, laws: Mapping[int, Law]) -> dict[int, StrengthRatio]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ import mpm_core as mpm
 from fenics_bridge.errors import InputError, agree, real_numbers
 from fenics_bridge.fem.at_rest import warn_beyond_strength
 from fenics_bridge.fem.fem_site import FemSite
-from fenics_bridge.fem.overconsolidation import hardened, upward
+from fenics_bridge.fem.overconsolidation import before_equilibrium, hardened, upward
 from fenics_bridge.fem.small_strains import without_memory
 from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport
 from fenics_bridge.fem.strength_ratio import STRENGTH, StrengthRatio, strengths, vertical_stress
@@ -132,7 +133,8 @@ class ParticleSite:
         }
         self._strengthen(weak, vertical, laws)
         if at_rest:
-            given, admissible = place_at_rest(model, at_rest, placed)
+            harden = partial(self._harden, before_equilibrium(ratios, laws))
+            given, admissible = place_at_rest(model, at_rest, placed, harden)
             warn_beyond_strength(model.comm, f"stage {stage.name!r}: ", given, admissible)
         self._weigh(state)
         apply_supports(model, state.supports)

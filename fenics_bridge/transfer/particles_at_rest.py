@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -77,7 +77,10 @@ def carried_stress(model: mpm.Model, nmd: bool) -> NDArray[np.float64]:
 
 
 def place_at_rest(
-    model: mpm.Model, stress: Mapping[int, NDArray[np.float64]], rows_of: Mapping[int, NDArray[np.bool_]]
+    model: mpm.Model,
+    stress: Mapping[int, NDArray[np.float64]],
+    rows_of: Mapping[int, NDArray[np.bool_]],
+    harden: Callable[[], None],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Give the particles that a stage has placed their stresses at rest. Collective.
 
@@ -85,6 +88,7 @@ def place_at_rest(
         model: the particles.
         stress: stresses by the tag of the soil, from `stress_at_rest`.
         rows_of: whether each particle is one that the stage has placed, by the tag of its soil.
+        harden: gives the particles the state variables of their history, which belong to these stresses.
 
     Returns:
         These stresses (n, S) [Pa], and the same, brought back to the strength.
@@ -95,6 +99,7 @@ def place_at_rest(
         rows = np.flatnonzero(rows_of[tag])
         every[rows[np.argsort(p.id[rows])]], chosen[rows] = given, True
     p.set("stress", every)
+    harden()
     return every[chosen], _admissible(model)[chosen]
 
 

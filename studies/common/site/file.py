@@ -282,8 +282,9 @@ def site_of(
             own = dict.fromkeys(bridge.names_of(cell_tags).get(soil, (soil,)), law)
         laws |= own
         say(unit_doubt(parameters, where, heights.values()))
-        say(idle_doubt(part_of(given, (*law_keys(), OVERCONSOLIDATION)), where))
-        say(left_out_doubt(parameters, where))
+        with_history = part_of(given, (*law_keys(), OVERCONSOLIDATION))
+        say(idle_doubt(with_history, where))
+        say(left_out_doubt(with_history, where))
         one = next(iter(own.values()))
         say(secant_doubt(one, where))
         say("" if soil in k0 else k0_doubt(one, ratios.get(soil, 1.0), where))

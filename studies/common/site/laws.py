@@ -122,7 +122,9 @@ def without_effect(table: Mapping[str, Any]) -> list[str]:
     idle |= set() if table.get("undrained", False) else {"water_modulus"}
     idle |= set() if table.get("small_strain_modulus") else {"threshold_strain"}
     idle |= set() if has_ratio(table) else {RATIO, EXPONENT}
-    idle |= set() if kind == "hardening-soil" or has_ratio(table) else {OVERCONSOLIDATION}
+    idle |= set() if kind in ("hardening-soil", "cam-clay") or has_ratio(table) else {OVERCONSOLIDATION}
+    idle |= {"preconsolidation"} if OVERCONSOLIDATION in table else set()
+    idle |= set() if table.get("creep") else {"reference_time"}
     return [key for key in table if key in idle]
 
 
@@ -172,6 +174,7 @@ def left_out_doubt(table: Mapping[str, Any], where: str) -> str:
     """
     given = {"cohesion" if key in STRENGTHS else key for key in table}
     given |= {"friction_angle", "residual_friction_angle"} if has_ratio(table) else set()
+    given |= {"preconsolidation"} if OVERCONSOLIDATION in table else set()
     missing = [key for key in needed_keys(_kind_of(table)) if key not in given]
     if not missing:
         return ""

@@ -209,3 +209,49 @@ def test_a_law_without_memory_or_that_varies_is_refused(tmp_path, law):
         ):
             site.carry_out(stage)
         assert site.number == 0 and site.state.there == ()
+
+
+CLAY = mpm.CamClay(
+    compression=0.2,
+    swelling=0.04,
+    critical_slope=1.0,
+    poisson=0.2,
+    preconsolidation=1e3,
+    void_ratio=1.0,
+    attraction=1e3,
+)
+
+
+def compressed_clay(before, after):
+    """Vertical strain of clay by the law itself, in an oedometer, from one vertical stress to another."""
+    jaky = 1 - 3 / 7  # sin(phi) = 3 M / (6 + M) of the critical state
+    at_rest = -before * np.array([jaky, 1.0, jaky, 0.0])
+    history = -RATIO * before * np.array([jaky, 1.0, jaky, 0.0])
+    state = np.zeros(CLAY.n_state)
+    state[1] = mpm.log_preconsolidation(CLAY, history[None])[0]
+    test = mpm.ElementTest(CLAY, at_rest, state)
+    for vertical in np.linspace(before, after, 201)[1:]:
+        test.step([0.0, None, 0.0, 0.0], stress=[0.0, -vertical, 0.0, 0.0])
+    return -test.strain[1]
+
+
+@pytest.mark.parametrize("method", ["elements", "particles"])
+def test_cam_clay_keeps_its_stress_at_rest_and_settles_by_its_overconsolidation(ground, method):
+    """Its `preconsolidation` of 1 kPa, far below its stress, is no matter."""
+    stages = (
+        beginning(weight=10.0, k0={SOIL: 1 - 3 / 7}, overconsolidation={SOIL: RATIO}),
+        *(bridge.Stage(f"{p:g}", pressure={"top": p}) for p in np.linspace(1, 4, 41)[1:] * SURCHARGE),
+    )
+    if method == "elements":
+        site = site_of(ground, {SOIL: CLAY})
+    else:
+        model = mpm.Model(bridge.background_mesh(*ground), [CLAY])
+        site = bridge.ParticleSite(model, {SOIL: 0}, ROLLERS, small_displacements=True)
+    moved = [site.carry_out(stage).largest_displacement for stage in stages]
+    if method == "particles":
+        p = model.particles
+        moved[-1] = HEIGHT * np.mean(-p.displacement[:, 1] / p.position[:, 1])  # the surface is above all particles
+    assert moved[0] < 1e-8
+    strain = compressed_clay(SURCHARGE, 4 * SURCHARGE)
+    assert strain > 0.05
+    assert moved[-1] == pytest.approx(strain * HEIGHT, rel=0.01)

@@ -9,6 +9,7 @@ import study_main
 from common.consolidation.site import read_consolidation_site
 from common.site.file import read_site
 from common.site.hardening_doubts import k0_doubt, secant_at_half, secant_doubt
+from common.site.laws import idle_doubt, left_out_doubt
 from common.slope.site import read_slope_site
 from common.stages.runs import carry_out
 from hardening_soil_cases import hyperbola, preloaded, strength
@@ -259,3 +260,16 @@ def test_ground_behind_a_wall_settles_by_less_and_presses_less_on_its_strut_wher
         found[ratio] = last["settlement_m"], -last["lower_strut_axial_force_N_per_m"], last["heave_m"]
     assert found[5][0] < 0.6 * found[1][0] and found[5][1] < 0.97 * found[1][1]
     assert found[5][2] == pytest.approx(found[1][2], rel=0.02)
+
+
+def test_cam_clay_has_its_overconsolidation_in_place_of_a_preconsolidation_pressure(tmp_path):
+    clay = {"material": "cam-clay", "compression_slope": 0.2, "swelling_slope": 0.04, "critical_slope": 1.0, "void_ratio": 1.0,
+            "poisson": 0.2, "attraction": 1e3, "overconsolidation": 1.5}  # fmt: skip
+    assert not idle_doubt(clay, "soils.clay")
+    assert not left_out_doubt(clay, "soils.clay")
+    assert "preconsolidation has no effect" in idle_doubt(clay | {"preconsolidation": 50e3}, "soils.clay")
+    assert "preconsolidation = 20000 Pa" in left_out_doubt(
+        {key: value for key, value in clay.items() if key != "overconsolidation"}, "soils.clay"
+    )
+    assert "reference_time has no effect" in idle_doubt(clay | {"reference_time": 3600.0}, "soils.clay")
+    assert not idle_doubt(clay | {"reference_time": 3600.0, "creep": 0.01}, "soils.clay")
