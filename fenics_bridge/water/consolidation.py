@@ -36,7 +36,13 @@ from fenics_bridge.views import body_text
 from fenics_bridge.water.applied import AppliedBoundary
 from fenics_bridge.water.boundary import Flux, WaterBoundary, listed
 from fenics_bridge.water.consolidation_results import ConsolidationResults
-from fenics_bridge.water.consolidation_step import ConsolidationReport, CoupledStep, collapsed, solve_step
+from fenics_bridge.water.consolidation_step import (
+    ConsolidationReport,
+    CoupledStep,
+    collapsed,
+    solve_step,
+    warn_of_large_strains,
+)
 from fenics_bridge.water.construction import lonely_dofs, reconfigure
 from fenics_bridge.water.coupled import (
     CoupledConstraints,
@@ -159,6 +165,7 @@ class Consolidation(ConsolidationResults):
         self._active, self._inflow = (np.zeros(len(self.pressure.x.array), dtype=kind) for kind in (bool, float))
         self.motion: Motion | None = None
         """Velocity and acceleration; None in quasi-static steps"""
+        self._named_large_strains = False
         self._named_coarse_cells = False  # whether `run` has warned of cells that are too large for its first step
         self._options_prefix = options_prefix
         self._assemble(inertia)
@@ -309,8 +316,8 @@ class Consolidation(ConsolidationResults):
             dt: length of the step [s].
 
         Returns:
-            Report of the step; a step that fails changes nothing. One after which soil has moved by a tenth of the body
-            has failed: it collapses.
+            Report of the step; a step that fails changes nothing. One in which soil moves by a tenth of the body has
+            failed: it collapses.
 
         Raises:
             InputError: dt is not positive, or a load or boundary condition is not possible. Raised on all ranks alike.
@@ -329,7 +336,7 @@ class Consolidation(ConsolidationResults):
             self.motion.begin(dt)
         report, active, iterations, reason = self._solved(external, load.displacement, end, dt, stored)
         if self.motion is None and not reason:
-            reason = collapsed(self._moved(), self.domain)
+            reason = collapsed(self._body.increment.x.array[self._displacements[1]], self.domain)
         if reason:
             return ConsolidationReport(self.time, dt, iterations, report.residuals, reason=reason)
         self._inflow = self._step_state(dt)[1]
@@ -342,6 +349,9 @@ class Consolidation(ConsolidationResults):
         self._external, self._active = external, active
         self._standing = self._reservoirs.forces(end)
         self._read_pressure()
+        if self.motion is None and not self._named_large_strains:
+            moved = self._body.solution.x.array[self._displacements[1]]
+            self._named_large_strains = warn_of_large_strains(moved, self.domain)
         error = self.stored_water() - stored - dt * self.inflow(None)
         return ConsolidationReport(end, dt, iterations, report.residuals, error)
 
@@ -387,11 +397,6 @@ class Consolidation(ConsolidationResults):
         start, duration = self._holding
         part = 1 - (time - start) / duration if duration > 0 else 0.0
         return part if part > RELEASED else 0.0
-
-    def _moved(self) -> NDArray[np.float64]:
-        """Displacements at the end of the step under trial [m], shape (m,)."""
-        body, dofs = self._body, self._displacements[1]
-        return (body.solution.x.array + body.increment.x.array)[dofs]
 
     def _read_pressure(self) -> None:
         self.pressure.x.array[:] = self._unit * self._body.solution.x.array[self._pressures[1]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,7 +20,7 @@ MOST_SETS = 30
 """Guesses of where a pressure is at its upper bound, in a step."""
 
 COLLAPSE = 0.1
-"""Of the size of a body, by which soil does not move in quasi-static steps."""
+"""Of the size of a body, by which soil does not move in one quasi-static step, and beyond which strains are not small."""
 
 SLACK = 1e-9
 """By how much, relative to the largest, a head may exceed its bound or a flow have the wrong sign."""
@@ -165,12 +166,30 @@ def accepted(report: NewtonReport, solver: Solver) -> NewtonReport:
 
 
 def collapsed(displacements: NDArray[np.float64], domain: Mesh) -> str:
-    """Why displacements [m] are none of small strains; empty where they are. Collective.
+    """Why the displacements [m] of a step are none of equilibrium; empty where they may be. Collective.
 
     At collapse residuals hardly depend on the motion of the mechanism, so that Newton's method may end anywhere along it.
     """
+    largest, most = _largest_and_most(displacements, domain)
+    return f"it collapses: soil would move by {largest:.2g} m, more than {most:.2g} m" if largest > most else ""
+
+
+def warn_of_large_strains(displacements: NDArray[np.float64], domain: Mesh) -> bool:
+    """Warn where displacements [m] are beyond what small strains are; returns whether they are. Collective."""
+    largest, most = _largest_and_most(displacements, domain)
+    if largest > most:
+        warnings.warn(
+            f"soil has moved by {largest:.2g} m, more than a tenth of the body: finite elements take strains for small, and refer them to the undeformed "
+            "ground, so that settlements are too large by about half of the strain; particles (`--particles`) move with the soil",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+    return largest > most
+
+
+def _largest_and_most(displacements: NDArray[np.float64], domain: Mesh) -> tuple[float, float]:
+    """The largest displacement, and a tenth of the size of the body [m]. Collective."""
     x, comm = domain.geometry.x, domain.comm
     ends = (-x.min(axis=0), x.max(axis=0)) if len(x) else (np.full(3, -np.inf),) * 2
     size = np.max(comm.allgather(ends), axis=0).sum(axis=0).max()
-    largest, most = max(comm.allgather(np.abs(displacements).max(initial=0.0))), COLLAPSE * size
-    return f"it collapses: soil would move by {largest:.2g} m, more than {most:.2g} m" if largest > most else ""
+    return max(comm.allgather(float(np.abs(displacements).max(initial=0.0)))), COLLAPSE * float(size)

@@ -456,3 +456,43 @@ def test_the_pressure_between_smooth_plates_rises_as_mandel_says():
         assert model.run(factor * period, 1e-3 * period, 1.2)[-1].converged
         rise.append((pressure() - start) / 5e3)
     assert rise[1] == pytest.approx(1.1555, rel=0.02) and rise[0] < 1.08
+
+
+def test_soft_clay_creeps_on_when_its_water_is_out(tmp_path):
+    """By creep / v times the height for each factor e of time, in `meshes/soft_clay.toml`; without creep not at all."""
+    from common.consolidation.site import read_consolidation_site
+
+    from fenics_bridge import water
+
+    slope = {}
+    for creep in (0.01, 0.0):
+        text = f'extends = "{STUDIES.parent}/meshes/soft_clay.toml"\ncell_size = 1.0\n[soils.clay]\nconductivity = 1e-6\ncreep = {creep}\n'
+        (tmp_path / "site.toml").write_text(text)
+        site = read_consolidation_site(tmp_path / "site.toml", MPI.COMM_SELF)
+        model = site.at_rest(water.Element.TAYLOR_HOOD)
+        settled = []
+        for days in (2e3, 2e4):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # coarse cells, large strains
+                assert model.run(86400.0 * days, 86400.0, 1.4)[-1].converged
+            settled.append(-model.displacement.x.array.min())
+        slope[creep] = (settled[1] - settled[0]) / np.log(10)
+        volume = 2.6 * np.exp(-np.mean(settled) / 5)
+    assert slope[0.01] == pytest.approx(0.01 / volume * 5, rel=0.1)  # the volume is that without creep
+    assert abs(slope[0.0]) < 1e-5
+
+
+def test_settlements_of_more_than_a_tenth_of_the_body_are_warned_of_and_are_no_collapse(tmp_path):
+    from common.consolidation.site import read_consolidation_site
+
+    from fenics_bridge import water
+
+    text = f'extends = "{STUDIES.parent}/meshes/soft_clay.toml"\ncell_size = 1.0\n[soils.clay]\nconductivity = 1e-6\n'
+    (tmp_path / "site.toml").write_text(text)
+    model = read_consolidation_site(tmp_path / "site.toml", MPI.COMM_SELF).at_rest(water.Element.TAYLOR_HOOD)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        assert model.run(86400.0 * 200, 86400.0, 1.3)[-1].converged
+    found = [str(one.message) for one in said if "more than a tenth of the body" in str(one.message)]
+    assert len(found) == 1
+    assert -model.displacement.x.array.min() > 0.5
