@@ -114,8 +114,7 @@ struct LimitingModulus
     const double preconsolidation = (law.preconsolidation + law.attraction) * std::exp(state[1]);
     const double carried = law.creep > 0 ? law.attraction - mean_stress : 0.0; // fast loading goes beyond it
     const double most = 2 * std::max(preconsolidation, carried);
-    return moduli_of_bulk(bulk_per_pressure(law, state[2]) * (most - law.attraction), law.poisson)
-        .p_wave;
+    return moduli_of_bulk(bulk_per_pressure(law, state[2]) * (most - law.attraction), law.poisson).p_wave;
   }
   double operator()(const NorSand& law) const
   {
