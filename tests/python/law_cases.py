@@ -30,15 +30,15 @@ class Batch:
         return np.stack(columns, axis=2)
 
 
-def assert_alike_alone_and_among_others(law, stress, strain, start):
+def assert_alike_alone_and_among_others(law, stress, strain, start, dt=np.inf):
     """Points have the same stress and state, to the last bit, by themselves, together, and with a tangent."""
-    batch, together, state = Batch(law, stress, strain, start), stress.copy(), start.copy()
-    report = law.update(strain, together, state)
+    batch, together, state = Batch(law, stress, strain, start, dt), stress.copy(), start.copy()
+    report = law.update(strain, together, state, dt=dt)
     assert (report.plastic, report.failed) == (batch.report.plastic, batch.report.failed)
     assert (together == batch.stress).all() and (state == batch.state).all()
     for i in range(len(stress)):
         alone, alone_state = stress[i : i + 1].copy(), start[i : i + 1].copy()
-        law.update(strain[i : i + 1], alone, alone_state)
+        law.update(strain[i : i + 1], alone, alone_state, dt=dt)
         assert (alone[0] == together[i]).all() and (alone_state[0] == state[i]).all()
     return report
 

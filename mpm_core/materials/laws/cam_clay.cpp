@@ -171,15 +171,22 @@ void write(const Start<T>& a, const Result<T>& r, const Deviators<D, T>& deviato
 /// Whether soil creeps in increments of this duration
 bool creeps(const Clay& clay, double dt) { return clay.creep_per_time > 0 && std::isfinite(dt); }
 
+/// Whether a point flows faster than at its preconsolidation pressure
+template <class N>
+Mask<N> flows(const CreepAt<N>& at)
+{
+  return at.creeps & (at.log_flow > at.log_rate);
+}
+
 /// An increment of soil that creeps
 template <int D>
 Outcome creep_point(const Start<double>& a, const Result<double>& trial, const Deviators<D, double>& deviators,
                     const PointBatch<D>& points, Index i, double* tangent)
 {
-  const std::optional<CreepAt> at = creep_solution(a, trial, points.dt);
+  const std::optional<CreepAt<double>> at = creep_solution(a, trial, points.dt);
   if (!at)
     return Outcome::failed;
-  const Result<double> result = at->creeps ? creep_result(a, *at) : trial;
+  const Result<double> result = creep_result(a, *at);
   write(a, result, deviators, points, i);
   if (tangent)
   {
@@ -187,7 +194,19 @@ Outcome creep_point(const Start<double>& a, const Result<double>& trial, const D
     write_secant_tangent<D>(secant_trial<D>(result.shear, deviators.stress, deviators.strain), deviators.strain,
                             result.ratio, by_volume, by_q, tangent);
   }
-  return at->creeps && at->log_flow > at->log_rate ? Outcome::plastic : Outcome::elastic;
+  return flows(*at) ? Outcome::plastic : Outcome::elastic;
+}
+
+/// The same for a few points
+template <int D>
+std::optional<Index> creep_points(const Start<Lanes>& a, const Result<Lanes>& trial,
+                                  const Deviators<D, Lanes>& deviators, const PointBatch<D>& points, Index i)
+{
+  const std::optional<CreepAt<Lanes>> at = creep_solution(a, trial, points.dt);
+  if (!at)
+    return {};
+  write(a, creep_result(a, *at), deviators, points, i);
+  return count(flows(*at));
 }
 
 template <int D>
@@ -214,13 +233,13 @@ Outcome update_point(const Clay& clay, const PointBatch<D>& points, Index i, dou
 template <int D>
 std::optional<Index> update_points(const Clay& clay, const PointBatch<D>& points, Index i)
 {
-  if (creeps(clay, points.dt))
-    return {};
   Deviators<D, Lanes> deviators;
   const Start<Lanes> a = start_of(clay, points, i, deviators);
   Result<Lanes> result = result_of(a, Lanes{}, Lanes{});
   if (any(!is_sound(a, result)))
     return {};
+  if (creeps(clay, points.dt))
+    return creep_points(a, result, deviators, points, i);
   const LaneMask plastic = yields(result);
   if (any(plastic) && !newton(a, result, plastic))
     return {};

@@ -11,11 +11,12 @@ namespace mpm::materials::cam_clay
 {
 /// The solution: the creep part x of the volumetric strain, and ln of z = m p, with the multiplier m of the flow
 /// x = m (2 p - p_eq)
+template <class N>
 struct CreepAt
 {
-  double x = 0, log_flow = 0;
-  double log_rate = 0; ///< ln of z at p_eq = p_c over the increment
-  bool creeps = false; ///< false where no time has passed, or creep is below round-off
+  N x, log_flow;
+  N log_rate;     ///< ln of z at p_eq = p_c over the increment
+  Mask<N> creeps; ///< false where no time has passed, or creep is below round-off
 };
 
 /// Changes by which the tangent is differentiated
@@ -29,60 +30,81 @@ template <class T>
 struct CreepEnd
 {
   T pressure, shear, ratio; ///< as in `Result`
-  T square;                 ///< q^2 of the trial
-  T flow, rate; ///< the equations: x - z (1 - q^2 / (M^2 p^2)), and ln of p_c of the rate over that of the history
+  T flow;                   ///< the equations: x - z (1 - q^2 / (M^2 p^2)),
+  T rate;                   ///< and ln of p_c by the rate over that of the history
 };
 
 template <class T>
 T exponential(const T& x)
 {
-  const auto value = std::exp(value_of(x));
-  return chained(x, Number<T>(value), value);
+  using N = Number<T>;
+  const N value = each(value_of(x), [](double number) { return falling_exponential(-number); });
+  return chained(x, value, value);
 }
 
 template <class T>
-CreepEnd<T> creep_end(const Start<double>& a, double log_rate, const T& x, const T& log_flow,
+CreepEnd<T> creep_end(const Start<Number<T>>& a, const Number<T>& log_rate, const T& x, const T& log_flow,
                       const CreepChanges<T>& changes = {})
 {
+  using N = Number<T>;
   const Clay& clay = a.clay;
-  const T y = a.elastic * (a.volumetric + changes.volumetric - x);
+  const T one = T{} + 1, y = a.elastic * (changes.volumetric - x + a.volumetric);
   const Exponential<T> growth = exponential_of<T>(y);
   const T pressure = a.pressure * growth.factor;
-  const T shear = clay.shear_ratio * a.elastic * a.pressure * growth.mean;
-  const double double_shear = 2 * value_of(shear);
+  const T shear = N(clay.shear_ratio * a.elastic * a.pressure) * growth.mean;
+  const N double_shear = 2 * value_of(shear);
   const T along =
-      chained(shear, polynomial<double>(a.square, double_shear), 2 * polynomial_slope<double>(a.square, double_shear));
-  const T trial_q = square_root(positive_part(along)) + changes.q, square = trial_q * trial_q;
-  const T z = exponential(log_flow);
-  const T ratio = T(1.0) / (1.0 + 6 / clay.slope_squared * shear * z / pressure);
-  const T slope = ratio * ratio * square / (clay.slope_squared * pressure * pressure); // (q / (M p))^2
-  const T hardening = a.plastic * x;
-  return {pressure,
-          shear,
-          ratio,
-          square,
-          x - z * (1.0 - slope),
-          (log_flow - log_rate) / clay.exponent - std::log(a.pressure / a.preconsolidation) - y + hardening -
-              logarithm(T(1.0 + slope))};
+      chained(shear, polynomial<N>(a.square, double_shear), N(2 * polynomial_slope<N>(a.square, double_shear)));
+  const T trial_q = square_root(positive_part(along)) + changes.q, z = exponential(log_flow);
+  const T ratio = one / (6 / clay.slope_squared * shear * z / pressure + 1);
+  const T stress_ratio = ratio * trial_q / pressure; // q / p
+  const T slope = stress_ratio * stress_ratio / clay.slope_squared;
+  const T of_rate = (log_flow - log_rate) / clay.exponent, hardening = a.plastic * x;
+  return {pressure, shear, ratio, x - z * (one - slope),
+          of_rate + hardening - y - logarithm(T(one + slope)) - logarithm<N>(a.pressure / a.preconsolidation)};
 }
 
 /// Creep strains below this are none [-].
 inline constexpr double least_creep = 1e-18;
 
-/// z of an isotropic stress, which the others are near to: ln(z) / exponent + (v / kappa + v / (lambda - kappa)) z = c
-inline double isotropic_flow(const Start<double>& a, const Result<double>& trial, double log_rate)
+/// ln z of an isotropic stress, which the others are near to: ln(z) / exponent + (v / kappa + v / (lambda - kappa)) z =
+/// c
+template <class N>
+N isotropic_flow(const Start<N>& a, const Result<N>& trial, const N& log_rate)
 {
-  const double slope = trial.square / (a.clay.slope_squared * trial.pressure * trial.pressure);
-  const double c = log_rate / a.clay.exponent + std::log(trial.pressure / a.preconsolidation) + std::log1p(slope);
-  const double softness = a.elastic + a.plastic;
-  double l =
-      std::min(a.clay.exponent * c, std::log(std::max(c, 1e-3) / softness)); // on the side from which it converges
-  for (int iteration = 0; iteration < 8; ++iteration)
+  const double exponent = a.clay.exponent;
+  const N slope = trial.square / (a.clay.slope_squared * trial.pressure * trial.pressure);
+  const N c = log_rate / exponent + logarithm<N>(trial.pressure / a.preconsolidation) + logarithm<N>(1 + slope);
+  const N softness = a.elastic + a.plastic;
+  N l = smaller<N>(exponent * c, logarithm<N>(larger<N>(c, N{} + 1e-3) / softness)); // from here on it converges
+  for (int iteration = 0; iteration < 6; ++iteration)
   {
-    const double z = softness * std::exp(l);
-    l -= (l / a.clay.exponent + z - c) / (1 / a.clay.exponent + z);
+    const N z = softness * exponential<N>(l);
+    l = l - (l / exponent + z - c) / (1 / exponent + z);
   }
   return l;
+}
+
+/// Newton's method from the isotropic solution
+/// @returns where it converges, or where there is no creep
+template <class N>
+Mask<N> creep_newton(const Start<N>& a, CreepAt<N>& at)
+{
+  constexpr int most = 30;
+  Mask<N> open = at.creeps;
+  for (int iteration = 0; iteration < most && any(open); ++iteration)
+  {
+    const auto end = creep_end<Dual<2, N>>(a, at.log_rate, variable<2>(at.x, 0), variable<2>(at.log_flow, 1));
+    const auto& [fx, fl] = end.flow.slopes;
+    const auto& [rx, rl] = end.rate.slopes;
+    const N determinant = fx * rl - fl * rx;
+    const N dx = (fl * end.rate.value - rl * end.flow.value) / determinant;
+    const N dl = (rx * end.flow.value - fx * end.rate.value) / determinant;
+    at.x = at.x + chosen<N>(open, dx, N{});
+    at.log_flow = at.log_flow + chosen<N>(open, larger<N>(smaller<N>(dl, N{} + 2), N{} - 5), N{});
+    open = open & !((absolute<N>(a.elastic * dx) < 1e-12) & (absolute(dl) < 1e-9));
+  }
+  return !open;
 }
 
 /// x that satisfies the equation of the flow at a given z
@@ -96,9 +118,10 @@ inline double strain_at(const Start<double>& a, double log_rate, double log_flow
   return root_between(excess, {least, excess(least)}, {most, excess(most)});
 }
 
-/// The same by brackets
-inline std::optional<CreepAt> bracketed_creep(const Start<double>& a, double log_rate, double guess)
+/// The same by brackets around a guess; false where there is no solution
+inline bool creep_by_brackets(const Start<double>& a, CreepAt<double>& at, double guess)
 {
+  const double log_rate = at.log_rate;
   const auto excess = [&](double l) { return creep_end<double>(a, log_rate, strain_at(a, log_rate, l), l).rate; };
   double low = guess - 1, high = guess + 1;
   while (excess(low) > 0 && low > guess - 1000)
@@ -107,53 +130,43 @@ inline std::optional<CreepAt> bracketed_creep(const Start<double>& a, double log
     high += 1;
   const Sample first{low, excess(low)}, last{high, excess(high)};
   if (!(first.f <= 0 && last.f >= 0))
-    return {};
-  const double l = root_between(excess, first, last);
-  return CreepAt{strain_at(a, log_rate, l), l, log_rate, true};
+    return false;
+  at.log_flow = root_between(excess, first, last);
+  at.x = strain_at(a, log_rate, at.log_flow);
+  return true;
 }
 
-/// Nothing where there is no solution
+/// Nothing where a point has no solution, or one of a few by brackets only
 /// @param dt  duration of the increment [s]
-inline std::optional<CreepAt> creep_solution(const Start<double>& a, const Result<double>& trial, double dt)
+template <class N>
+std::optional<CreepAt<N>> creep_solution(const Start<N>& a, const Result<N>& trial, double dt)
 {
-  constexpr int most = 30;
-  const double volume = a.elastic * a.clay.swelling, rate = dt * a.clay.creep_per_time / volume;
-  if (!(rate > 0))
-    return CreepAt{};
-  const double log_rate = std::log(rate), guess = isotropic_flow(a, trial, log_rate);
-  if (guess < std::log(least_creep))
-    return CreepAt{};
-  CreepAt at{std::exp(guess), guess, log_rate, true};
-  for (int iteration = 0; iteration < most; ++iteration)
-  {
-    const auto end = creep_end<Dual<2>>(a, log_rate, variable<2>(at.x, 0), variable<2>(at.log_flow, 1));
-    const auto& [fx, fl] = end.flow.slopes;
-    const auto& [rx, rl] = end.rate.slopes;
-    const double determinant = fx * rl - fl * rx;
-    const double dx = (fl * end.rate.value - rl * end.flow.value) / determinant;
-    const double dl = (rx * end.flow.value - fx * end.rate.value) / determinant;
-    if (!(std::abs(dx) < 1 && std::abs(dl) < 1e6))
-      break;
-    at.x += dx;
-    at.log_flow += std::clamp(dl, -5.0, 2.0);
-    if (std::abs(a.elastic * dx) < 1e-12 && std::abs(dl) < 1e-9)
+  const N volume = a.elastic * a.clay.swelling;
+  const N rate = dt * a.clay.creep_per_time / volume + std::numeric_limits<double>::min(); // of no time too
+  const N log_rate = logarithm<N>(rate), guess = isotropic_flow(a, trial, log_rate);
+  CreepAt<N> at{exponential<N>(guess), guess, log_rate, guess > std::log(least_creep)};
+  const Mask<N> found = creep_newton(a, at);
+  if (!any(!found))
+    return at;
+  if constexpr (std::is_same_v<N, double>)
+    if (creep_by_brackets(a, at, guess))
       return at;
-  }
-  return bracketed_creep(a, log_rate, guess);
+  return {};
 }
 
-inline Result<double> creep_result(const Start<double>& a, const CreepAt& at)
+template <class N>
+Result<N> creep_result(const Start<N>& a, const CreepAt<N>& at)
 {
-  const double pressure = creep_end<double>(a, at.log_rate, at.x, at.log_flow).pressure;
-  return result_of(a, at.x, std::exp(at.log_flow) / pressure);
+  const N multiplier = exponential<N>(at.log_flow) / creep_end<N>(a, at.log_rate, at.x, at.log_flow).pressure;
+  return result_of<N>(a, chosen<N>(at.creeps, at.x, N{}), chosen<N>(at.creeps, multiplier, N{}));
 }
 
 /// Derivatives of the new stress by the volumetric strain, and by q of the trial
-inline std::array<SecantSlopes, 2> creep_slopes(const Start<double>& a, const CreepAt& at)
+inline std::array<SecantSlopes, 2> creep_slopes(const Start<double>& a, const CreepAt<double>& at)
 {
   using T = Dual<4>;
-  const double log_flow = at.creeps ? at.log_flow : -1e3;
-  const CreepEnd<T> end = creep_end<T>(a, at.log_rate, variable<4>(at.x, 0), variable<4>(log_flow, 1),
+  const double x_at = at.creeps ? at.x : 0.0, log_flow = at.creeps ? at.log_flow : -600.0;
+  const CreepEnd<T> end = creep_end<T>(a, at.log_rate, variable<4>(x_at, 0), variable<4>(log_flow, 1),
                                        {variable<4>(0.0, 2), variable<4>(0.0, 3)});
   const auto &f = end.flow.slopes, &r = end.rate.slopes;
   const double determinant = f[0] * r[1] - f[1] * r[0];

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bridge_cases import column
 from core_cases import box, rollers, run
-from law_cases import Batch, assert_tangent, mean_and_radius, random_points
+from law_cases import Batch, assert_alike_alone_and_among_others, assert_tangent, mean_and_radius, random_points
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -181,6 +181,20 @@ def test_finite_elements_creep_by_the_duration_of_their_steps():
         assert fem.equilibrate(bridge.Load(displacement=step / STEPS), duration=3 * DAY).converged
     expected = compressed_point(3 * DAY)
     assert np.abs(fem.points.stress - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("dt", [1e-4, DAY])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_point_is_updated_alike_alone_and_among_others_with_and_without_tangent(dim, dt):
+    random, law = np.random.default_rng(2), clay(preconsolidation=60e3)
+    stress, increment = random_points(dim, 801, pressure=60e3, deviator=10e3, strain=1.0)
+    increment *= 10 ** random.uniform(-7, -1.5, (801, 1))
+    increment[17, 1], stress[100, 1] = np.nan, np.inf
+    state = np.zeros((801, law.n_state))
+    state[:, 1] = random.uniform(-0.2, 2.0, 801)
+    report = assert_alike_alone_and_among_others(law, stress, increment, state, dt=dt)
+    assert report.failed == 2
+    assert 50 < report.plastic < 780
 
 
 def test_creep_below_zero_is_refused():
