@@ -7,8 +7,8 @@ quadratic finite elements, and particles in quasi-static stages.
 
 import numpy as np
 from _case import Check, Result
+from _level_ground import HEIGHT, WIDTH, ground
 from _plots import save_comparison
-from common.files import ROOT
 from mpi4py import MPI
 from scipy.integrate import quad
 
@@ -18,7 +18,7 @@ import mpm_core as mpm
 REFERENCE, EXPONENT, FAILURE_RATIO, POISSON = 100e3, 0.5, 0.9, 0.2  # Pa, -, -, -
 SECANT, OEDOMETER, UNLOADING, FRICTION = 30e6, 30e6, 90e6, 35.0  # Pa, degrees
 PRESSURES = (50e3, 100e3, 200e3)  # Pa, of triaxial tests
-HEIGHT, WIDTH, UNIT_WEIGHT = 10.0, 1.0, 20e3  # m, N/m3
+UNIT_WEIGHT = 20e3  # N/m3
 LOADS = (50e3, 100e3, 150e3, 200e3, 150e3, 100e3)  # Pa, at the surface of the ground
 TOP = "top"
 K0 = 1 - np.sin(np.radians(FRICTION))
@@ -90,12 +90,6 @@ def triaxial(pressure, steps):
 def stages():
     begin = bridge.Stage("ground", fill="clay", unit_weight={"clay": UNIT_WEIGHT}, k0={"clay": K0})
     return [begin, *(bridge.Stage(f"{load / 1e3:g} kPa", pressure={TOP: load}) for load in LOADS)]
-
-
-def ground(cell_size):
-    parameters = {"height": HEIGHT, "width": WIDTH, "cell_size": cell_size}
-    mesh = bridge.read_mesh(ROOT / "meshes" / "layer.geo", MPI.COMM_WORLD, parameters=parameters)
-    return mesh, [bridge.roller("left", (1, 0)), bridge.roller("right", (1, 0)), bridge.fixed("base")]
 
 
 def finite_elements(cell_size):

@@ -8,8 +8,8 @@ The methods are quadratic finite elements, and particles in quasi-static stages.
 
 import numpy as np
 from _case import Check, Result
+from _level_ground import HEIGHT, WIDTH, ground
 from _plots import save_comparison
-from common.files import ROOT
 from mpi4py import MPI
 from scipy.optimize import brentq
 
@@ -21,7 +21,7 @@ UNLOADING = 90e6 / (2 * (1 + POISSON))  # Pa, shear modulus
 SLOPE = 0.385
 END = THRESHOLD / SLOPE * (np.sqrt(G0 / UNLOADING) - 1)
 """Strain from which on the tangent modulus is that of unloading"""
-HEIGHT, WIDTH, LOAD, TOP = 10.0, 1.0, 300e3, "top"  # m, m, Pa
+LOAD, TOP = 300e3, "top"  # Pa
 LEFT = (250e3, 150e3, 300e3)  # Pa, of the load, stage by stage
 K0 = 1.0
 CONSTRAINED = 2 * (1 - POISSON) / (1 - 2 * POISSON)
@@ -114,12 +114,6 @@ def tested(law, small_cycles):
 def stages():
     begin = bridge.Stage("ground", fill="clay", unit_weight={"clay": 20e3}, k0={"clay": K0}, pressure={TOP: LOAD})
     return [begin, *(bridge.Stage(f"{load / 1e3:g} kPa", pressure={TOP: load}) for load in LEFT)]
-
-
-def ground(cell_size):
-    parameters = {"height": HEIGHT, "width": WIDTH, "cell_size": cell_size}
-    mesh = bridge.read_mesh(ROOT / "meshes" / "layer.geo", MPI.COMM_WORLD, parameters=parameters)
-    return mesh, [bridge.roller("left", (1, 0)), bridge.roller("right", (1, 0)), bridge.fixed("base")]
 
 
 def finite_elements(cell_size):
