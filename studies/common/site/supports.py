@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from dolfinx.mesh import exterior_facet_indices
+from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -33,6 +35,7 @@ def supports_of(table: dict, path: Path, domain: Any, facet_tags: Any) -> list[b
             f"{path} has no [supports], and the mesh has no boundary named {', '.join(DEFAULT_SUPPORTS)}; it has {list(names)}"
         )
     _warn_of_upright_base(path, domain, facet_tags)
+    _warn_of_sides_without_name(path, domain, facet_tags, bool(table.get("axisymmetric")))
     if not table.get("supports"):
         _warn_of_free_sides(path, domain, facet_tags, given)
     return [support_of(name, kind, f"{path}: supports.{name}", domain, facet_tags) for name, kind in given.items()]
@@ -61,10 +64,8 @@ def _warn_of_free_sides(path: Path, domain: Any, facet_tags: Any, held: Mapping[
         facet_tags: tags of its boundaries.
         held: supports by boundary.
     """
-    dim, comm = domain.geometry.dim, domain.comm
-    x = domain.geometry.x
-    low, high = (reduce(comm.allgather(values), axis=0) for reduce, values in
-                 ((np.min, x.min(axis=0, initial=np.inf)), (np.max, x.max(axis=0, initial=-np.inf))))  # fmt: skip
+    comm, x = domain.comm, domain.geometry.x
+    low, high = _ends(domain)
     free = []
     for name in bridge.names_of(facet_tags):
         normal = None if name in held else bridge.flat_normal(domain, facet_tags, name)
@@ -80,6 +81,33 @@ def _warn_of_free_sides(path: Path, domain: Any, facet_tags: Any, held: Mapping[
         say(f"{path}: the boundar{'ies' if several else 'y'} {' and '.join(map(repr, free))} at the side{'s' if several else ''} of the mesh "
             f"{'are' if several else 'is'} free, since without [supports] only {', '.join(DEFAULT_SUPPORTS)} are held: name {'them' if several else 'it'} "
             "in [supports], or give [supports] without it where it is a free surface")  # fmt: skip
+
+
+def _ends(domain: Any) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the largest coordinates of a mesh, (3,) each [m]. Collective."""
+    x, comm = domain.geometry.x, domain.comm
+    ends = np.max(comm.allgather([-x.min(axis=0, initial=np.inf), x.max(axis=0, initial=-np.inf)]), axis=0)
+    return -ends[0], ends[1]
+
+
+def _warn_of_sides_without_name(path: Path, domain: Any, facet_tags: Any, axisymmetric: bool) -> None:
+    """Warn where boundaries without a name, which no support holds, are at the lower end or at a side of a mesh; path: of the file. Collective.
+
+    The axis of an axisymmetric mesh needs no support.
+    """
+    dim, (low, high) = domain.geometry.dim, _ends(domain)
+    nameless = np.setdiff1d(exterior_facet_indices(domain.topology), facet_tags.indices)
+    corners = domain.geometry.x[facet_nodes(domain, nameless)]
+    near = 1e-6 * (high - low).max()
+    ends = [(axis, end) for axis in range(dim - 1) for end in (low, high)] + [(dim - 1, low)]
+    found = []
+    for axis, end in ends[1:] if axisymmetric else ends:
+        there = (np.abs(corners[:, :, axis] - end[axis]) < near).all(axis=1)
+        if domain.comm.allreduce(bool(there.any()), MPI.LOR):
+            found.append(f"{'xyz'[axis]} = {end[axis]:g} m")
+    if found:
+        say(f"{path}: the mesh has boundaries without a name at {' and '.join(found)}, which no support holds: name them in the mesh, as physical groups "
+            "of gmsh, also where they are free surfaces")  # fmt: skip
 
 
 def _warn_of_upright_base(path: Path, domain: Any, facet_tags: Any) -> None:

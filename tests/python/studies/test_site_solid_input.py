@@ -199,3 +199,17 @@ def test_a_side_that_no_default_support_holds_is_warned_of(tmp_path, recwarn, ri
     read_site(tmp_path / "site.toml", COMM)
     said = [str(one.message) for one in recwarn if "at the side of the mesh is free" in str(one.message)]
     assert len(said) == free and all("the boundary 'east'" in text and "left, right, front" in text for text in said)
+
+
+@pytest.mark.parametrize("left_out, axisymmetric, place", [
+    ("base", "", "y = 0 m"), ("left", "", "x = 0 m"), ("right", "", "x = 4 m"), ("top", "", ""), ("left", "axisymmetric = true\n", ""),
+])  # fmt: skip
+def test_a_side_of_the_mesh_without_a_name_is_warned_of(tmp_path, recwarn, left_out, axisymmetric, place):
+    lines = SECTION.format(right="right").replace("; ", ";\n").splitlines()
+    (tmp_path / "section.geo").write_text("\n".join(line for line in lines if f'("{left_out}")' not in line))
+    soil = '[soils.clay]\nunit_weight = 18e3\nmaterial = "tresca"\nyoung = 5e6\npoisson = 0.4\nshear_strength = 20e3\n'
+    (tmp_path / "site.toml").write_text(f'mesh = "section.geo"\n{axisymmetric}{soil}')
+    read_site(tmp_path / "site.toml", COMM)
+    said = [str(one.message) for one in recwarn if "boundaries without a name" in str(one.message)]
+    assert len(said) == bool(place)
+    assert all(f"without a name at {place}, which no support holds" in text for text in said)
