@@ -311,6 +311,14 @@ def main(arguments: list[str] | None = None) -> int:
     if a.site is not None:
 
         def require(site):
+            if site.axisymmetric and (a.seismic_coefficient or a.critical_seismic):
+                given = (
+                    f"--seismic-coefficient is {a.seismic_coefficient:g}"
+                    if a.seismic_coefficient
+                    else "--critical-seismic is given"
+                )
+                raise mpm.InputError(f"{given}, but {a.site} is axisymmetric: inertia along the radius would push its soil "
+                                     "away from the axis on all sides; expected a plane section or a body in three dimensions")  # fmt: skip
             if a.particles and site.soils_with_strength_ratio:
                 raise mpm.InputError(f"--particles: {a.site} has strength_ratio, but these particles begin without the stresses that it needs; leave "
                                      "the option out, or follow the particles of the site by the study embankment")  # fmt: skip

@@ -65,7 +65,7 @@ from .laws import (
 from .mesh import check_soils, geometry_of, site_mesh
 from .stages import stage_of
 from .strength import law_of_table, ratio_of, with_strength_ratios
-from .supports import supports_of
+from .supports import supports_of, warn_of_rigid_core
 
 
 @dataclass
@@ -259,6 +259,8 @@ def site_of(
     axisymmetric = geometry_of(table, path) is not None
     domain, cell_tags, facet_tags = site_mesh(table, path, comm, cell_size)
     check_soils(table, path, cell_tags)
+    if axisymmetric:
+        warn_of_rigid_core(path, domain, facet_tags, table.get("supports") or None)
     soils, laws, weights = table["soils"], {}, {}
     k0, ratios = k0_of(soils, path), overconsolidation_of(soils, path)
     weak = {soil: ratio for soil, given in soils.items() if (ratio := ratio_of(given, f"{path}: soils.{soil}"))}

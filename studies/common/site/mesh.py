@@ -6,6 +6,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -52,12 +53,23 @@ def site_mesh(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None) 
     constants = table.get("constants", {}) | ({} if size is None else {"cell_size": size})
     mesh = path.parent / str(table["mesh"])
     try:
-        return bridge.read_mesh(mesh, comm, dimension_of(table, path), parameters=constants)
+        domain, cell_tags, facet_tags = bridge.read_mesh(mesh, comm, dimension_of(table, path), parameters=constants)
     except mpm.InputError as error:
         text = str(error).replace(
             "tetrahedra are read with dim=3", "of tetrahedra it needs dimension = 3 in the file of the site"
         )
         raise mpm.InputError(f"{path}: mesh: {text}") from None
+    if geometry_of(table, path) is not None:
+        _require_radii(domain, path)
+    return domain, cell_tags, facet_tags
+
+
+def _require_radii(domain: Any, path: Path) -> None:
+    """Require that no node of the mesh of an axisymmetric site is beyond the axis; path: of the file, for the error. Collective."""
+    least = min(domain.comm.allgather(float(domain.geometry.x[:, 0].min(initial=np.inf))))
+    if least < 0:
+        raise mpm.InputError(f"{path}: axisymmetric is true, but the mesh begins at x = {least:g} m; expected x from 0 on, which is the radius: draw "
+                             "only the half of the section on that side of the axis, and the axis at x = 0")  # fmt: skip
 
 
 def part_of_mesh(mesh: tuple[Any, Any, Any], soils: Collection[str]) -> tuple[Any, Any, Any]:

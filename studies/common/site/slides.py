@@ -99,7 +99,7 @@ class Slide:
         forces = {name: self.model.member_forces(name) for name in self.model.members}
         self.history.add(
             time_s=report.time, largest_displacement_m=comm.allreduce(float(moved), MPI.MAX), plastic_fraction=report.plastic_fraction,
-            **{energy_column(self.model): report.kinetic_energy}, **force_row(self.model.members, forces),
+            **{energy_column(self.model): whole_energy(self.model, report.kinetic_energy)}, **force_row(self.model.members, forces),
         )  # fmt: skip
         self.files.write()
         solid = self.model.mesh.dim == 3
@@ -124,7 +124,12 @@ def slide_movie(title: str, ground: Scene | Solid | None, result: Slide) -> Movi
 
 def energy_column(model: mpm.Model) -> str:
     """Column of the kinetic energy, which in plane strain is that of a slice 1 m thick."""
-    return "kinetic_energy_J" if model.mesh.dim == 3 else "kinetic_energy_J_per_m"
+    return "kinetic_energy_J_per_m" if model.geometry == mpm.Geometry.PLANE_STRAIN else "kinetic_energy_J"
+
+
+def whole_energy(model: mpm.Model, energy: float) -> float:
+    """An energy of a model for its column: that of an axisymmetric body all around the axis, where a model has that of one radian."""
+    return 2 * np.pi * energy if model.geometry == mpm.Geometry.AXISYMMETRIC else energy
 
 
 def particles_per_cell(a: Namespace, site: Site) -> int:

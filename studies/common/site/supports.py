@@ -19,6 +19,8 @@ from ..checks import say
 
 LEAST_LEVEL = 0.05
 """Part of the area of a base, seen from above, below which it stands upright"""
+ON_AXIS = 1e-9
+"""Part of the largest radius up to which a boundary counts as on the axis"""
 DEFAULT_SUPPORTS = {
     "base": "fixed",
     **dict.fromkeys(("left", "right", "front", "back", "sides", "axis", "far"), "roller"),
@@ -39,6 +41,31 @@ def supports_of(table: dict, path: Path, domain: Any, facet_tags: Any) -> list[b
     if not table.get("supports"):
         _warn_of_free_sides(path, domain, facet_tags, given)
     return [support_of(name, kind, f"{path}: supports.{name}", domain, facet_tags) for name, kind in given.items()]
+
+
+def warn_of_rigid_core(path: Path, domain: Any, facet_tags: Any, supports: Mapping[str, str] | None) -> None:
+    """Warn of boundaries of an axisymmetric site that are held as an axis is, but are not on it: they hold the soil as a rigid core does. Collective.
+
+    Args:
+        path: of the file.
+        domain, facet_tags: of the mesh.
+        supports: kinds by boundary as in the file; None where it has none, so that those of `DEFAULT_SUPPORTS` are held.
+    """
+    names = bridge.names_of(facet_tags)
+    held = [
+        name
+        for name in (("axis", "left") if supports is None else ("axis",))
+        if name in names and name in (supports or names)
+    ]
+    for name in held:
+        x = domain.geometry.x[facet_nodes(domain, tagged_facets(domain.comm, facet_tags, name, "supports"))][:, :, 0]
+        ends = domain.comm.allgather((float(x.min(initial=np.inf)), float(x.max(initial=-np.inf))))
+        low, high = min(low for low, _ in ends), max(high for _, high in ends)
+        size = max(domain.comm.allgather(float(domain.geometry.x[:, 0].max(initial=0.0))))
+        if low > ON_AXIS * size:
+            where = f"x = {low:.4g} m" if high - low <= ON_AXIS * size else f"x = {low:.4g} to {high:.4g} m"
+            say(f"{path}: the boundary {name!r} is at {where}, but the axis of an axisymmetric site is at x = 0: a support there holds the soil as a rigid "
+                "core of that radius does. Let the mesh begin at x = 0, or give [supports] without it where it is the side of a hole")  # fmt: skip
 
 
 def support_of(name: str, kind: str, where: str, domain: Any, facet_tags: Any) -> bridge.Support:
