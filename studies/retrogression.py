@@ -34,6 +34,7 @@ from common.results import open_results
 from common.schemes import add_pic
 from common.site.laws import unit_doubt
 from common.slope.case import SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
+from common.soils import law_of
 from common.summary import write_summary
 from mpi4py import MPI
 
@@ -51,6 +52,8 @@ MEASURES = {
 }  # fmt: skip
 """Quantities by which the mesh sizes are compared. Nearly all of the stresses' work is dissipated in the slips: the
 elastic energy of the soil changes little."""
+DISTURBED = "cohesion_deviation"
+"""State of a law by which its strength deviates from that of its parameters"""
 AT_REST, STILL, REST = 1e-3, 1e-3, 2.0
 """A slope is at rest when its kinetic energy has stayed below this fraction of its maximum, or its velocity on average (root mean
 square) below this one [m/s], for this time [s]: a scarp may stand for a moment before it fails too."""
@@ -64,7 +67,7 @@ def parser() -> ArgumentParser:
     p = study_parser(__doc__)
     add_slope_options(p)
     p.set_defaults(
-        height=6.0, angle=27.0, crest=30.0, runout_length=20.0, cell_size=1.0, particles_per_cell=3, unit_weight=17e3,
+        height=6.0, angle=27.0, crest=30.0, runout_length=40.0, cell_size=1.0, particles_per_cell=3, unit_weight=17e3,
         material="softening", young=2e6, poisson=0.45, cohesion=15e3, friction_angle=0.0, residual_cohesion=4e3,
         softening_strain=0.3, reference_length=0.5, tension_cutoff=5e3,
     )  # fmt: skip
@@ -83,6 +86,12 @@ def parser() -> ArgumentParser:
         p, "--coupled", False, "begin with resting cells, which are finite elements until the clay in them fails"
     )
     return p
+
+
+def given_law(a: Namespace) -> str:
+    """The option that says which law the clay has, and its value."""
+    option = next((name for name in ("python_law", "umat") if getattr(a, name)), "material")
+    return f"--{option.replace('_', '-')} is {getattr(a, option)}"
 
 
 # --- 2. Start: stresses by finite elements, and a disturbed toe ------------------------------------------------------
@@ -108,7 +117,7 @@ def disturb(case: SlopeCase) -> None:
     mesh = case.model.mesh
     x = mesh.points[mesh.cells[case.model.particles.cell]].mean(axis=1)
     near = np.hypot(x[:, 0] - case.toe, x[:, 1]) < case.args.disturbed
-    case.model.set_state("cohesion_deviation", np.where(near, -case.args.disturbed_loss, 0.0))
+    case.model.set_state(DISTURBED, np.where(near, -case.args.disturbed_loss, 0.0))
 
 
 # --- 3. The slide ----------------------------------------------------------------------------------------------------
@@ -174,7 +183,22 @@ def slide(args: Namespace, size: float, folder: Path, interrupt: Interrupt) -> S
                     break
         except mpm.RunError as error:
             result.stopped = str(error)
+            if "left the background mesh" in result.stopped:
+                result.stopped += (
+                    f"; what leaves it beyond the toe needs more --runout-length than {a.runout_length:g} m"
+                )
     return result
+
+
+def reaches_side(result: Slide) -> str:
+    """A warning where the slope has failed back to less than its height from the side of the mesh, which holds the soil; else no text."""
+    a, failed = result.case.args, result.history["retrogression_m"][-1]
+    if a.crest - failed >= a.height:
+        return ""
+    return (
+        f"--crest is {a.crest:g} m, of which {failed:.3g} m have failed with cells of {result.cell_size:g} m: the side of the mesh holds the rest, and the slope "
+        f"may fail farther back. Take a --crest that is longer than the failed length by at least --height, {a.height:g} m"
+    )
 
 
 # --- 4. Pictures -----------------------------------------------------------------------------------------------------
@@ -232,12 +256,16 @@ def main(arguments: list[str] | None = None) -> int:
     say(unit_doubt(vars(a), "the slope"))
     check(p, a.disturbed >= a.cell_size, lambda: f"--disturbed is {a.disturbed:g} m, expected at least --cell-size, {a.cell_size:g} m: the clay "
           "is disturbed cell by cell")  # fmt: skip
+    law = law_of(a)
+    check(p, DISTURBED in law.state_names, lambda: f"{given_law(a)}, expected --material softening or a law with the state {DISTURBED!r}: the clay around the toe "
+          "is disturbed by it")  # fmt: skip
     folder = open_results(a, comm)
     results, movies, pictures = [], [], {}
     with Interrupt(comm) as interrupt:
         for size in [a.cell_size, a.cell_size / 2][: 1 if a.meshes == "one" else 2]:
             if not interrupt.requested():
                 results.append(slide(a, size, folder, interrupt))
+                say(reaches_side(results[-1]))
                 scene = results[-1].case.scene()
                 movies.append(particle_movie(f"cells of {size:g} m", scene, results[-1].frames))
                 pictures |= drawn(a, results[-1], scene, folder)

@@ -73,6 +73,8 @@ REFUSED = [
     ("runout", "--crs local", "--crs is given, expected --terrain and --rupture with it"),
     # a slope that does not fail
     ("retrogression", "--disturbed 0.2 --cell-size 1", "--disturbed is 0.2 m, expected at least --cell-size, 1 m"),
+    ("retrogression", "--material tresca", "--material is tresca, expected --material softening or a law with the state"),
+    ("retrogression", "--disturbed-loss 90", "--disturbed-loss is '90', expected a number above 0 and at most 1"),
     ("coupled_slope", "--unit-weight 20", "--unit-weight is 20 N/m3, expected above --initial-unit-weight, 15000 N/m3"),
     ("runout", "--terrain no.asc --rupture no.tif", "--terrain is no.asc, but there is no such file"),
 ]  # fmt: skip
