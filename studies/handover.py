@@ -21,16 +21,19 @@ from common.movie import fem_frame, particle_frame, particle_movie
 from common.options import add_number, add_switch, check, study_parser
 from common.page import Page
 from common.plots import save_history
+from common.quiet import NOT_REACHED, without_warning
 from common.ranks import run_study
 from common.results import open_results
 from common.schemes import averages_strains
 from common.slope.case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
 from common.slope.fem import NO_COHESION, step_line, weight
+from common.soils import given_law
 from common.summary import write_summary
 from common.watch import Watch
 from mpi4py import MPI
 
 import fenics_bridge as bridge
+import mpm_core as mpm
 from particle_player import Movie
 
 comm = MPI.COMM_WORLD
@@ -70,11 +73,33 @@ def hand_over(case: SlopeCase, unit_weight: float) -> bridge.Handover | None:
         return None
     nmd = averages_strains("explicit", case.model.laws)
     case.fem = fem = soil_fem(case, nmd)
-    fem.solve(weight(unit_weight))
+    with without_warning(NOT_REACHED):  # said by the error
+        fem.solve(weight(unit_weight))
+    if not fem.converged:
+        raise mpm.RunError(f"the finite elements found no equilibrium under {unit_weight:.5g} N/m3 at once, but under {fem.load.unit_weight:.5g} N/m3 at most, "
+                           "although they collapsed above it as the weight rose in steps: there is nothing to hand over")  # fmt: skip
     case.model.set_gravity((0.0, -GRAVITY * unit_weight / case.args.unit_weight))
     report = bridge.initialise(case.model, fem, move=case.args.move, nmd=nmd)
     case.model.set_gravity((0.0, -GRAVITY))
     return report
+
+
+def unit_weight_at_collapse(a: Namespace) -> float:
+    """Unit weight [N/m3] at which the finite elements collapse, all of whose fractions particles take over. Collective.
+
+    Raises:
+        InputError: they do not collapse, or under more than the unit weight of the slide, so that the slope would not slide.
+    """
+    case = build_slope(a, comm)
+    fem = soil_fem(case, averages_strains("explicit", case.model.laws))
+    found = bridge.collapse_load(fem, weight, first_step=2e3, progress=step_line("collapse", "unit weight [N/m3]"))
+    if not found.failed:
+        raise mpm.InputError(f"{given_law(a)}, and its slope was not shown to collapse under {found.value:.4g} N/m3 or less, expected soil that can "
+                             f"fail: {found.reason}")  # fmt: skip
+    if found.value >= a.unit_weight:
+        raise mpm.InputError(f"--unit-weight is {a.unit_weight:g} N/m3, under which the slope does not slide; expected more than that at which the finite elements "
+                             f"collapse, {found.value:.5g} N/m3")  # fmt: skip
+    return float(found.value)
 
 
 def slide(case: SlopeCase, watch: Watch) -> tuple[np.ndarray, list[dict]]:
@@ -143,12 +168,8 @@ def movies(runs: list[dict]) -> list[Movie | None]:
 def main(arguments: list[str] | None = None) -> int:
     a = parse(arguments)
     start = perf_counter()
+    collapse = unit_weight_at_collapse(a)
     folder = open_results(a, comm)
-    case = build_slope(a, comm)
-    fem = soil_fem(case, averages_strains("explicit", case.model.laws))
-    collapse = bridge.collapse_load(
-        fem, weight, first_step=2e3, progress=step_line("collapse", "unit weight [N/m3]")
-    ).value
     runs = [run(a, fraction, fraction * collapse) for fraction in FRACTIONS]
     runouts = [float(run["history"][-1, 1]) for run in runs]
     summary = {

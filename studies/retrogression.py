@@ -34,7 +34,7 @@ from common.results import open_results
 from common.schemes import add_pic
 from common.site.laws import unit_doubt
 from common.slope.case import SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
-from common.soils import law_of
+from common.soils import given_law, law_of
 from common.summary import write_summary
 from mpi4py import MPI
 
@@ -86,12 +86,6 @@ def parser() -> ArgumentParser:
         p, "--coupled", False, "begin with resting cells, which are finite elements until the clay in them fails"
     )
     return p
-
-
-def given_law(a: Namespace) -> str:
-    """The option that says which law the clay has, and its value."""
-    option = next((name for name in ("python_law", "umat") if getattr(a, name)), "material")
-    return f"--{option.replace('_', '-')} is {getattr(a, option)}"
 
 
 # --- 2. Start: stresses by finite elements, and a disturbed toe ------------------------------------------------------

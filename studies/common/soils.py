@@ -155,6 +155,12 @@ def check_law_options(parser: argparse.ArgumentParser, options: argparse.Namespa
             say(secant_doubt(law_of(options), "--material hardening-soil"))
 
 
+def given_law(a: argparse.Namespace) -> str:
+    """The option that says which law the clay has, and its value."""
+    option = next((name for name in ("python_law", "umat") if getattr(a, name)), "material")
+    return f"--{option.replace('_', '-')} is {getattr(a, option)}"
+
+
 def law_of(args: argparse.Namespace) -> Any:
     """The law that the options describe.
 

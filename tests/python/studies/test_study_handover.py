@@ -42,13 +42,19 @@ def test_particles_converge_to_the_finite_elements(tmp_path):
     [
         ("handover", ["--cohesion", "0"], ["--cohesion", "soil at the surface of a slope has no strength"]),
         (
+            "handover",
+            ["--unit-weight", "20e3", *COARSE],
+            ["--unit-weight is 20000 N/m3", "expected more than that at which"],
+        ),
+        ("handover", ["--material", "elastic", *COARSE], ["--material is elastic", "expected soil that can fail"]),
+        (
             "compare_fem",
             ["--cohesion", "1", "--cell-size", "0.2", "--meshes", "1"],
             ["carries none of the unit weights"],
         ),
     ],
 )
-def test_slopes_that_do_not_stand_are_refused(tmp_path, name, options, words):
+def test_slopes_that_do_not_stand_or_do_not_slide_are_refused(tmp_path, name, options, words):
     result = ended(name, tmp_path, *options)
     assert result.returncode == 2
     assert all(word in result.stderr for word in words), result.stderr
