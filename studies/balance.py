@@ -88,7 +88,7 @@ def difference(one: Slide, other: Slide) -> float:
     if comm.rank != 0:
         return 0.0
     last = [run.frames[-1]["position"][np.argsort(run.frames[-1]["id"])] for run in (one, other)]
-    return float(np.abs(last[0] - last[1]).max())
+    return float(np.linalg.norm(last[0] - last[1], axis=1).max())
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -104,7 +104,7 @@ def main(arguments: list[str] | None = None) -> int:
     scene = cases[0].scene()
     first, repartitioned = runs.values()
     results = {
-        "mean_imbalance_first_partition": float(np.mean(first.imbalance)),
+        "mean_imbalance_first_partition": float(np.mean(first.imbalance[1:])),
         "mean_imbalance_repartitioned": float(np.mean(repartitioned.imbalance[1:])),
         "repartitions": repartitioned.repartitions,
         "largest_difference_m": difference(first, repartitioned),

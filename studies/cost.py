@@ -22,7 +22,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from common.figures import save_figure
-from common.options import add_count, add_number, study_parser
+from common.options import add_count, add_number, check, study_parser
 from common.page import Page
 from common.plots import CURVES, WIDTH, paper_style
 from common.ranks import run_study
@@ -67,7 +67,7 @@ def parser() -> ArgumentParser:
         above=0,
     )
     add_number(p, "--damping", 0.75, "-", "local damping of the explicit scheme", at_least=0, below=1)
-    add_number(p, "--tolerance", 1e-6, "-", "out-of-balance ratio to reach", above=0)
+    add_number(p, "--tolerance", 1e-6, "-", "out-of-balance ratio to reach", above=0, below=1)
     add_number(p, "--limit", 30.0, "s", "processor time of one run", above=0)
     return p
 
@@ -76,6 +76,9 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     p = parser()
     options = p.parse_args(arguments)
     check_slope_options(p, options)
+    check(p, options.initial_unit_weight < options.unit_weight,
+          lambda: f"--initial-unit-weight is {options.initial_unit_weight:g} N/m3, expected below --unit-weight, {options.unit_weight:g} N/m3, the rest of "
+          "which is the undrained load")  # fmt: skip
     return options
 
 
@@ -214,8 +217,9 @@ def save_costs(path: Path, rows: list[dict]) -> None:
                     axes.plot(x, y, "o", color=colour, markersize=4, fillstyle="full" if row["reached"] else "none")
                     if not row["reached"]:
                         axes.annotate("", (x, 1.8 * y), (x, y), arrowprops={"arrowstyle": "->", "color": colour})
-            every = [of(row) for row in rows]
-            axes.set_ylim(np.nanmin(every) / 2, 4 * np.nanmax(every))
+            every = [of(row) for row in rows if of(row) > 0]  # the clock may measure no time of small meshes
+            if every:
+                axes.set_ylim(min(every) / 2, 4 * max(every))
             axes.grid(linewidth=0.3, color="#d0d0d0")
             if soil == SOILS[0]:
                 axes.set_ylabel(label)
@@ -228,11 +232,19 @@ def save_costs(path: Path, rows: list[dict]) -> None:
         save_figure(figure, path)
 
 
-def speed_up(rows: list[dict]) -> dict[str, float]:
-    """Least ratio of the time of the explicit scheme to that of Newton's method on the finest mesh, for each soil."""
+def speed_up(rows: list[dict]) -> dict[str, float | None]:
+    """Least ratio of the time of the explicit scheme to that of Newton's method on the finest mesh, for each soil.
+
+    None where Newton's method did not come to its end, or in less time than the clock measures.
+    """
     finest = max(row["cells"] for row in rows)
-    time = {(row["soil"], row["method"]): row["cpu_seconds"] for row in rows if row["cells"] == finest}
-    return {soil: time[soil, "explicit"] / time[soil, "Newton"] for soil in SOILS}
+    last = {(row["soil"], row["method"]): row for row in rows if row["cells"] == finest}
+    ratios: dict[str, float | None] = {}
+    for soil in SOILS:
+        explicit, newton = (last[soil, method] for method in ("explicit", "Newton"))
+        known = newton["reached"] and newton["cpu_seconds"] > 0
+        ratios[soil] = explicit["cpu_seconds"] / newton["cpu_seconds"] if known else None
+    return ratios
 
 
 def print_table(rows: list[dict]) -> None:

@@ -1,7 +1,9 @@
-"""The studies handover and compare_fem, small."""
+"""The studies handover and compare_fem, small, and what balance and cost compare."""
 
+import importlib
 import json
 
+import numpy as np
 import pytest
 from study_main import ended
 
@@ -71,3 +73,30 @@ def test_hand_over_of_particles_that_move(tmp_path):
 def test_soft_soil_too_within_the_effect_of_its_deformed_shape(tmp_path):
     summary = summary_of("compare_fem", tmp_path, "--cell-size", "0.1", "--meshes", "1", "--young", "200e3")
     assert summary["crest_displacement_difference_on_finest_mesh"]["10000"] < 0.03
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_particles_come_to_rest_however_fast_their_weight_rises(tmp_path):
+    """In elastic soil the equilibrium does not depend on the way to it; the difference is that of linear cells to quadratic ones."""
+    fast = "--cell-size", "0.2", "--meshes", "1", "--ramp", "0.01"
+    for row in summary_of("compare_fem", tmp_path / "fast", *fast)["comparisons"][:2]:
+        assert row["out_of_balance_ratio"] < 1e-4 and row["crest_displacement_difference"] < 0.02
+    swinging = ended("compare_fem", tmp_path / "swinging", *fast, "--damping", "1e-4", "--cohesion", "1e6")
+    assert swinging.returncode == 0 and "are not at rest after" in swinging.stderr
+
+
+def test_the_balance_of_ranks_compares_distances_of_particles():
+    study = importlib.import_module("balance")
+    runs = [study.Slide(frames=[{"id": np.array(ids), "position": np.array(places)}]) for ids, places in
+            (([0, 1], [[0.0, 0.0], [1.0, 1.0]]), ([1, 0], [[1.0, 1.0], [3.0, 4.0]]))]  # fmt: skip
+    assert study.difference(*runs) == 5.0
+
+
+def test_the_cost_of_newtons_method_has_no_ratio_where_it_is_not_known():
+    study = importlib.import_module("cost")
+    rows = [{"cells": 8, "soil": soil, "method": method, "reached": reached, "cpu_seconds": seconds} for soil, method, reached, seconds in
+            (("drained", "explicit", True, 6.0), ("drained", "Newton", True, 2.0),
+             ("undrained", "explicit", False, 6.0), ("undrained", "Newton", True, 0.0))]  # fmt: skip
+    assert study.speed_up(rows) == {"drained": 3.0, "undrained": None}
+    rows[1]["reached"] = False
+    assert study.speed_up(rows)["drained"] is None
