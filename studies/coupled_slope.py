@@ -52,7 +52,9 @@ def parser() -> ArgumentParser:
     """Parser of all options; the help shows their units."""
     p = study_parser(__doc__)
     add_number(p, "--height", 1.0, "m", "height of the slope", above=0)
-    add_number(p, "--angle", 45.0, "degrees", "inclination of the slope", above=11, at_most=90)
+    add_number(
+        p, "--angle", 45.0, "degrees", "inclination of the slope, from 11.4 to 78.6, or 90", above=11, at_most=90
+    )
     add_number(p, "--width", 10.0, "-", "ratio of the ground's width to the height of the slope", above=3)
     add_number(
         p, "--depth", 5.0, "-", "ratio of the ground's depth below the crest to the height of the slope", above=1
@@ -91,6 +93,11 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     )
     check(p, options.cell_size <= 0.5 * options.height,
           lambda: f"--cell-size is {options.cell_size:g}, expected at most half of --height")  # fmt: skip
+    check(p, 11.4 <= options.angle <= 78.6 or options.angle == 90,
+          lambda: f"--angle is {options.angle:g}, expected 11.4 to 78.6, or 90, degrees: squares are stretched to fit the slope")  # fmt: skip
+    check(p, level_of(options) > 0,
+          lambda: f"--width is {options.width:g} with --angle {options.angle:g}, which leaves no level ground beside the slope, expected more than "
+          f"{1 / np.tan(np.radians(options.angle)) + 2 * options.cell_size / options.height:.3g}")  # fmt: skip
     check(p, options.unit_weight > options.initial_unit_weight,
           lambda: f"--unit-weight is {options.unit_weight:g} N/m3, expected above --initial-unit-weight, "
           f"{options.initial_unit_weight:g} N/m3: the slope fails as the unit weight rises")  # fmt: skip

@@ -75,6 +75,10 @@ REFUSED = [
     ("retrogression", "--disturbed 0.2 --cell-size 1", "--disturbed is 0.2 m, expected at least --cell-size, 1 m"),
     ("retrogression", "--material tresca", "--material is tresca, expected --material softening or a law with the state"),
     ("retrogression", "--disturbed-loss 90", "--disturbed-loss is '90', expected a number above 0 and at most 1"),
+    ("coupled_slope", "--width 4 --angle 12", "--width is 4 with --angle 12, which leaves no level ground beside the slope"),
+    ("coupled_slope", "--angle 80", "--angle is 80, expected 11.4 to 78.6, or 90, degrees"),
+    ("cost", "--initial-unit-weight 25e3", "--initial-unit-weight is 25000 N/m3, expected below --unit-weight, 20000 N/m3"),
+    ("cost", "--tolerance 1", "--tolerance is '1', expected a number above 0 and below 1"),
     ("coupled_slope", "--unit-weight 20", "--unit-weight is 20 N/m3, expected above --initial-unit-weight, 15000 N/m3"),
     ("runout", "--terrain no.asc --rupture no.tif", "--terrain is no.asc, but there is no such file"),
 ]  # fmt: skip
