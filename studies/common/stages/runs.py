@@ -13,6 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 import fenics_bridge as bridge
+from fenics_bridge.compat import cell_dofs
 from fenics_bridge.fem.stages import require_stages
 
 from ..figures import Pictures
@@ -91,10 +92,13 @@ def carry_out(site: Site, degree: int, folder: Path, comm: MPI.Comm, **options: 
 
 
 def movements(staged: bridge.FemSite) -> dict[str, float]:
-    """Largest heave, settlement and sideways displacement of the soil that is there [m]. Collective."""
+    """Largest heave, settlement and sideways displacement of a node of the soil that is there [m]. Collective.
+
+    At nodes, as the surface moves more than the points inside of cells where stresses are, the more the larger these are.
+    """
     fem = staged.fem
-    there = np.repeat(fem.points.material >= 0, fem.points.per_cell)
-    u = fem.evaluate_at(fem.points.coordinates())["displacement"][there]
+    there = cell_dofs(fem.displacement.function_space)[fem.points.cells[fem.points.material >= 0]].ravel()
+    u = fem.displacement.x.array.reshape(-1, fem.domain.geometry.dim)[there]
     movements = u[:, -1], -u[:, -1], np.linalg.norm(u[:, :-1], axis=1)
     largest = [fem.domain.comm.allreduce(float(v.max(initial=0.0)), MPI.MAX) for v in movements]
     return dict(zip(("heave_m", "settlement_m", "sideways_m"), largest))

@@ -8,6 +8,7 @@ import study_main
 from common.interrupt import Interrupt
 from common.site import slides
 from common.site.file import read_site
+from common.stages.runs import movements
 from mpi4py import MPI
 
 import fenics_bridge as bridge
@@ -103,3 +104,21 @@ def test_an_axis_without_a_support_is_an_error(tmp_path):
         mpm.InputError, match="nodes lie on the axis and may move along the radius, expected a roller there"
     ):
         site.finite_elements(1)
+
+
+def test_the_largest_settlement_is_that_of_the_surface(tmp_path):
+    """A cylinder between rollers under a pressure: u = p H / M at its top, whatever the cells; a cell's middle moves less."""
+    text = SITE + '[supports]\nbase = "fixed"\naxis = "roller"\nright = "roller"\n'
+    path = site_in(
+        tmp_path,
+        text + '[[stages]]\nfill = "soil"\nunit_weight = {soil = 0.0}\npressure = {top = 100e3}\n',
+        below=0.0,
+        cell_size=0.5,
+    )
+    site = read_site(path, MPI.COMM_WORLD)
+    staged = bridge.FemSite(site.finite_elements(1))
+    list(bridge.carry_out(staged, site.stages))
+    modulus = YOUNG * (1 - POISSON) / (1 + POISSON) / (1 - 2 * POISSON)
+    moved = movements(staged)
+    assert moved["settlement_m"] == pytest.approx(100e3 * HEIGHT / modulus, rel=1e-6)
+    assert moved["heave_m"] < 1e-12 and moved["sideways_m"] < 1e-9
