@@ -30,5 +30,6 @@ Physical Surface("film", 2) = {2};
 Physical Surface("plate", 3) = {3};
 Physical Curve("base", 1) = {1};
 Physical Curve("side", 2) = {21};
+Physical Curve("side of the plate", 5) = {22, 23};
 Physical Curve("top", 3) = {4};
 Physical Curve("axis", 4) = {11:13};
