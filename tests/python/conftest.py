@@ -4,8 +4,13 @@ import importlib
 import shutil
 import signal
 import subprocess
+import sys
+from pathlib import Path
 
 import pytest
+
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT / "studies"), str(ROOT)]  # studies, and what they have in common
 
 
 def pytest_configure():

@@ -1,18 +1,14 @@
 """Soil that slides along walls: cells beside them with a fraction of its strength."""
 
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from common.earth_pressure import stress_field
 from dolfinx import mesh
 from mpi4py import MPI
 
 import fenics_bridge as bridge
 import mpm_core as mpm
-
-sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
-from common.earth_pressure import stress_field  # noqa: E402
 
 WALL, BELOW, FAR, BASE, TOP = 1, 2, 3, 4, 5
 PHI, FRACTION, SURCHARGE = np.radians(25.0), 2 / 3, 1e5

@@ -1,17 +1,12 @@
 """Pictures of columns: panels beside one another, of a size that can be written."""
 
-import sys
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
-
-from common.field_plots import Field  # noqa: E402
-from common.figures import panel_figure  # noqa: E402
-from common.water.seepage_plots import HEAD, FlowPicture, _scales, save_flow  # noqa: E402
+from common.field_plots import Field
+from common.figures import panel_figure
+from common.water.seepage_plots import HEAD, FlowPicture, _scales, save_flow
 
 
 def column(width, head):

@@ -3,11 +3,8 @@
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from studies.common import results
 from studies.common.files import NOT_WRITTEN, OutputError, expendable, written_whole

@@ -2,21 +2,17 @@
 
 import importlib
 import subprocess
-import sys
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from common.schemes import SCHEMES, run_scheme
+from common.slope.case import build_slope, initialise
+from common.soils import MATERIALS, law_of
 from mpi4py import MPI
 
-sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
-
-from common.schemes import SCHEMES, run_scheme  # noqa: E402
-from common.slope.case import build_slope, initialise  # noqa: E402
-from common.soils import MATERIALS, law_of  # noqa: E402
-
-import mpm_core as mpm  # noqa: E402
+import mpm_core as mpm
 
 slope = importlib.import_module("slope")
 

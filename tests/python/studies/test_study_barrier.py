@@ -2,7 +2,6 @@
 
 import importlib
 import json
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,9 +9,8 @@ import numpy as np
 import pytest
 
 STUDIES = Path(__file__).parents[3] / "studies"
-sys.path.insert(0, str(STUDIES))
 
-from common.runout.impact import bore  # noqa: E402
+from common.runout.impact import bore
 
 
 @pytest.mark.parametrize("froude", [1.0, 2.0, 6.0])

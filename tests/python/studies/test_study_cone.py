@@ -1,17 +1,12 @@
 """Theory of the studies cone and piezocone: limit pressures, cone factors, strength and drainage of clay."""
 
 import importlib
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from common.cone_theory import drained_part, lu, spherical_limit_pressure, teh_houlsby, undrained_strength
 
 import mpm_core as mpm
-
-sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
-
-from common.cone_theory import drained_part, lu, spherical_limit_pressure, teh_houlsby, undrained_strength  # noqa: E402
 
 
 @pytest.mark.parametrize("rigidity", [50, 100, 500])

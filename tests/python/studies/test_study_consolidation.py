@@ -2,7 +2,6 @@
 
 import csv
 import json
-import sys
 import warnings
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from study_main import ended, main
 from mpm_core import InputError
 
 STUDIES = Path(__file__).parents[3] / "studies"
-sys.path.insert(0, str(STUDIES))
 SITE = (STUDIES.parent / "meshes" / "fill.toml").read_text()
 
 

@@ -2,8 +2,6 @@
 
 import csv
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +9,6 @@ from mpi4py import MPI
 
 from mpm_core import InputError
 
-sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
 STIFFNESS, PRESTRESS, HEIGHT, OEDOMETER = 1e6, -800.0, 2.0, 4.8e6
 GEO = """
 SetFactory("OpenCASCADE");

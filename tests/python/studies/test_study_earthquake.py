@@ -2,26 +2,21 @@
 
 import importlib
 import json
-import sys
 import warnings
 from argparse import Namespace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from common import figures
+from common.earthquake.motions import accelerations, as_motion, band_limited_noise, ricker
+from common.earthquake.newmark import pulse_slip, sliding_block, yield_acceleration
+from common.earthquake.plots import save_record
+from common.earthquake.response import amplification, spectral_ratio
+from common.earthquake.site import outcrop_motion
 from study_main import ended
 
-sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
-
-from common import figures  # noqa: E402
-from common.earthquake.motions import accelerations, as_motion, band_limited_noise, ricker  # noqa: E402
-from common.earthquake.newmark import pulse_slip, sliding_block, yield_acceleration  # noqa: E402
-from common.earthquake.plots import save_record  # noqa: E402
-from common.earthquake.response import amplification, spectral_ratio  # noqa: E402
-from common.earthquake.site import outcrop_motion  # noqa: E402
-
-import fenics_bridge as bridge  # noqa: E402
-import mpm_core as mpm  # noqa: E402
+import fenics_bridge as bridge
+import mpm_core as mpm
 
 
 @pytest.mark.parametrize("samples", [6, 7, 101])

@@ -1,17 +1,12 @@
 """Slopes on ground of the same soil, in the studies that look for collapse."""
 
-import sys
-from pathlib import Path
 
+import collapse
 import pytest
+import safety
+from common.slope.fem import outside_line
 
-sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
-
-import collapse  # noqa: E402
-import safety  # noqa: E402
-from common.slope.fem import outside_line  # noqa: E402
-
-import fenics_bridge as bridge  # noqa: E402
+import fenics_bridge as bridge
 
 FLAT_CLAY = ["--angle", "30", "--friction-angle", "0", "--cohesion", "1000", "--height", "1", "--crest", "2",
              "--cell-size", "0.2", "--meshes", "1"]  # fmt: skip

@@ -2,8 +2,6 @@
 
 import importlib
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +9,6 @@ import pytest
 import fenics_bridge as bridge
 import mpm_core as mpm
 
-sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
 study = importlib.import_module("liquefaction")
 COARSE = ["--cell-size", "0.5", "--time", "2.5", "--frames", "5", "--no-pictures"]
 

@@ -4,7 +4,6 @@ import csv
 import importlib
 import json
 import math
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,7 +13,6 @@ from mpi4py import MPI
 import mpm_core as mpm
 
 ROOT = Path(__file__).parents[3]
-sys.path.insert(0, str(ROOT / "studies"))
 SITE = (ROOT / "meshes" / "braced_excavation.toml").read_text()
 site_file = importlib.import_module("common.site.file")
 

@@ -2,7 +2,6 @@
 
 import importlib
 import re
-import sys
 import warnings
 from argparse import Namespace
 from pathlib import Path
@@ -19,11 +18,10 @@ from fenics_bridge.fem.locking import warn_of_locking_at_failure
 from mpm_core import failure_watch
 
 STUDIES = Path(__file__).parents[3] / "studies"
-sys.path.insert(0, str(STUDIES))
 
-from common import quiet  # noqa: E402
-from common.option_words import in_options  # noqa: E402
-from common.water import seepage_plots  # noqa: E402
+from common import quiet
+from common.option_words import in_options
+from common.water import seepage_plots
 
 
 def test_warnings_that_a_study_leaves_out_are_those_of_the_core():

@@ -3,7 +3,6 @@
 import importlib
 import json
 import re
-import sys
 import warnings
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from study_main import ended
 import mpm_core as mpm
 
 ROOT = Path(__file__).parents[3]
-sys.path.insert(0, str(ROOT / "studies"))
 pytestmark = pytest.mark.usefixtures("without_pictures")
 DIKE = ROOT / "meshes" / "dike.toml"
 SMALL = {

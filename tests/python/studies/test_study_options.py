@@ -13,9 +13,8 @@ import pytest
 import mpm_core as mpm
 
 STUDIES = Path(__file__).parents[3] / "studies"
-sys.path.insert(0, str(STUDIES))
 
-from talus.begin import begin  # noqa: E402
+from talus.begin import begin
 
 REFUSED = [
     # bodies of whole cells

@@ -1,11 +1,7 @@
 """Parameters of a study from a TOML file, and back to one."""
 
-import sys
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from studies.common.options import add_choice, add_count, add_flag, add_number, add_switch, formerly, study_parser
 from studies.common.parameters import write_parameters

@@ -1,14 +1,10 @@
 """The page of a run in a browser without a window: it loads, the slider moves the particles, the mouse finds them."""
 
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from browser import NEEDED, move_slider, number_of_colours, open_page, picture, started
 from PIL import Image
-
-sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from particle_player import Movie
 from studies.common.parameters import Parameter

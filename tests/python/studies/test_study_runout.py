@@ -1,7 +1,6 @@
 """Run-out over terrain: rasters that do not fit together, the strength of the ground, places, structures, and the end of a slide."""
 
 import importlib
-import sys
 from pathlib import Path
 
 import meshio
@@ -12,7 +11,6 @@ from study_main import ended
 import mpm_core as mpm
 
 STUDIES = Path(__file__).parents[3] / "studies"
-sys.path.insert(0, str(STUDIES))
 
 
 def write(path, values, corner=500000.0):

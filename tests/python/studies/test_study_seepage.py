@@ -2,7 +2,6 @@
 
 import json
 import re
-import sys
 import warnings
 from pathlib import Path
 
@@ -13,7 +12,6 @@ from mpi4py import MPI
 from mpm_core import InputError, RunError
 
 STUDIES = Path(__file__).parents[3] / "studies"
-sys.path.insert(0, str(STUDIES))
 SITE = (STUDIES.parent / "meshes" / "dam.toml").read_text()
 
 

@@ -2,7 +2,6 @@
 
 import importlib
 import json
-import sys
 import warnings
 from pathlib import Path
 
@@ -14,7 +13,6 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 ROOT = Path(__file__).parents[3]
-sys.path.insert(0, str(ROOT / "studies"))
 site_file = importlib.import_module("common.site.file")
 
 

@@ -2,7 +2,6 @@
 
 import importlib
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ from site_cases import SITE, give_room, site_in
 import mpm_core as mpm
 
 ROOT = Path(__file__).parents[3]
-sys.path.insert(0, str(ROOT / "studies"))
 site_file = importlib.import_module("common.site.file")
 
 

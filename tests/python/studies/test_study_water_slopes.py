@@ -3,7 +3,6 @@
 import importlib
 import json
 import re
-import sys
 import warnings
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from study_main import main
 from mpm_core import InputError
 
 STUDIES = Path(__file__).parents[3] / "studies"
-sys.path.insert(0, str(STUDIES))
 MESHES = STUDIES.parent / "meshes"
 SMALL = "--cell-size 2 --elements P1 --factor-times 1"
 

@@ -1,7 +1,6 @@
 """The water table in pictures, and the scale of pore pressures."""
 
 import importlib
-import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -20,7 +19,6 @@ from studies.common.water import seepage_plots
 from studies.common.water.seepage_plots import MODERATE, PRESSURE, FlowPicture, pressure_limits, save_flow
 
 ROOT = Path(__file__).parents[3]
-sys.path.insert(0, str(ROOT / "studies"))
 GAMMA = 10e3
 """Unit weight of water [N/m3]: 10 kPa in a metre"""
 

@@ -1,6 +1,5 @@
 """Ground whose water table is below its surface: at rest until something loads it."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,6 @@ from mpi4py import MPI
 from fenics_bridge import water
 
 STUDIES = Path(__file__).parents[3] / "studies"
-sys.path.insert(0, str(STUDIES))
 DAY = 86400.0
 SITE = f"""
 mesh = "{STUDIES.parent}/meshes/layer.geo"

@@ -1,6 +1,5 @@
 """Slides in which water flows: conductivities that differ with the direction, and the levels of reservoirs."""
 
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,7 +12,6 @@ import mpm_core as mpm
 from fenics_bridge import water
 
 STUDIES = Path(__file__).parents[3] / "studies"
-sys.path.insert(0, str(STUDIES))
 LAW = mpm.LinearElastic(young=10e6, poisson=0.3)
 DAY = 86400.0
 

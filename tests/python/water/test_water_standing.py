@@ -1,6 +1,5 @@
 """Water that stands on separate parts of the ground under one tag loads what is below these parts, and nothing between them."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ import fenics_bridge as bridge
 from fenics_bridge import water
 
 STUDIES = Path(__file__).parents[3] / "studies"
-sys.path.insert(0, str(STUDIES))
 BEDS, OTHER = 9, 8
 KPA = 1e3
 

@@ -1,6 +1,5 @@
 """Tables of boundary conditions over time: the water that enters is the integral of the table, however short an event is."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,6 @@ import fenics_bridge as bridge
 from fenics_bridge import water
 
 STUDIES = Path(__file__).parents[3] / "studies"
-sys.path.insert(0, str(STUDIES))
 DAY = 86400.0
 STORM = [[0.0, 0.0], [10.0, 0.0], [10.01, 100.0], [10.41, 100.0], [10.42, 0.0]]  # (days, mm/day)
 GUST = [[0.0, 0.0], [10.0, 0.0], [10.001, 200.0], [10.3, 0.0]]
