@@ -25,7 +25,7 @@ from common.followed import cells_near, mean_displacement, numbers_in
 from common.history import History
 from common.lengths import metres
 from common.movie import gathered, own_frame, particle_movie
-from common.options import add_count, add_number, study_parser
+from common.options import add_count, add_number, check, study_parser
 from common.output_options import add_picture_options
 from common.page import Page
 from common.plots import SHEAR_STRAIN, Quantity
@@ -102,6 +102,9 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check_motion(p, a)
     say(unit_doubt(vars(a), "the soil"))
     check_effect(p, a, a.conductivity is not None, ("--stiff-conductivity",), "--conductivity")
+    given = [word for word in a.sanisand if word.partition("=")[0] == "void_ratio"]
+    check(p, not given, lambda: f"--sanisand has '{given[0]}', expected --void-ratio {given[0].partition('=')[2]} in its place, from which the "
+          "porosity and the unit weight of the sand follow too")  # fmt: skip
     say(too_loose(a))  # and names what is wrong with the parameters of the sand
     return a
 

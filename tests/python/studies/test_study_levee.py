@@ -126,6 +126,10 @@ def test_the_levee_has_the_strength_of_its_options():
         (["--stiff-conductivity", "1e-7"], "--stiff-conductivity is given, expected --conductivity with it"),
         (["--conductivity", "0"], "--conductivity"),
         (["--sanisand", "dilatency=1"], "did you mean dilatancy?"),
+        (
+            ["--sanisand", "dilatancy=1", "void_ratio=0.65"],
+            "'void_ratio=0.65', expected --void-ratio 0.65 in its place",
+        ),
         (["--highest-frequency", "0.5"], "--highest-frequency is 0.5 Hz, expected above the lowest frequency"),
     ],
 )
