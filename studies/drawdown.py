@@ -17,7 +17,7 @@ from common.ranks import run_study
 from common.slope.site import SlopeSite
 from common.water.runs import water_slope_study
 from common.water.site import DAY
-from common.water.slides import add_optional_slide
+from common.water.slides import add_optional_slide, check_slide
 from common.water.slopes import add_water_slope_options, safety, steady_safety
 
 import fenics_bridge as bridge
@@ -46,7 +46,10 @@ def limits(a: Namespace, slope: SlopeSite, flow: water.Seepage) -> dict[str, bri
 
 
 def main(arguments: list[str] | None = None) -> int:
-    return water_slope_study(parser().parse_args(arguments), water.Reservoir, limits)
+    p = parser()
+    a = p.parse_args(arguments)
+    check_slide(p, a)
+    return water_slope_study(a, water.Reservoir, limits)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from common.options import study_parser
 from common.ranks import run_study
 from common.slope.site import SlopeSite
 from common.water.runs import water_slope_study
-from common.water.slides import add_optional_slide
+from common.water.slides import add_optional_slide, check_slide
 from common.water.slopes import add_water_slope_options, safety
 
 import fenics_bridge as bridge
@@ -34,7 +34,10 @@ def limits(a: Namespace, slope: SlopeSite, flow: water.Seepage) -> dict[str, bri
 
 
 def main(arguments: list[str] | None = None) -> int:
-    return water_slope_study(parser().parse_args(arguments), water.Rain, limits)
+    p = parser()
+    a = p.parse_args(arguments)
+    check_slide(p, a)
+    return water_slope_study(a, water.Rain, limits)
 
 
 if __name__ == "__main__":

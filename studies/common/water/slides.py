@@ -10,22 +10,27 @@ import warnings
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import ArrayLike
 
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge.water import Reservoir
 from fenics_bridge.water.boundary import value_at
+from fenics_bridge.water.soils import WATER_WEIGHT
 from particle_player import Movie
 
+from ..checks import check_effect, say
 from ..figures import Pictures
 from ..interrupt import Interrupt
 from ..lengths import metres
 from ..movie import particle_movie
 from ..options import add_choice, add_flag, add_number
 from ..scenes import scene_of
+from ..site.doubts import ends_of_height
 from ..site.slides import add_slide_options, averages, slide, slide_pictures
 from ..slope.site import SlopeSite
 from .site import DAY, by_law, directions_of, time_in_words, vertical_conductivity
@@ -35,6 +40,22 @@ comm = MPI.COMM_WORLD
 HOLDING = 0.9, 0.75, 0.6
 """Parts of the factor of safety by which the strength is divided in the equilibrium that particles take over: the first one with
 which linear cells, of averaged strains or without, stand"""
+
+SLIDE_OPTIONS = (
+    "--slide-from",
+    "--slide-water",
+    "--slide-step",
+    "--particles-per-cell",
+    "--damping",
+    "--pic",
+    "--nmd",
+    "--no-nmd",
+    "--time",
+)
+"""Options that have an effect in a slide only"""
+
+MOST_ENTERING = 0.02
+"""Rise of the water in a slide, by water that enters at the surface, over the height of the mesh, above which it is said"""
 
 COME_TO_REST = 0.1
 """Of the largest displacement, that comes in the second half of a slide that ends at rest"""
@@ -50,6 +71,12 @@ def add_optional_slide(parser: ArgumentParser) -> None:
                "failure; flows: water flows through the particles and drains at their surface, by implicit steps")  # fmt: skip
     add_number(p, "--slide-step", 0.02, "s", "longest time step of a slide in which water flows", above=0)
     add_slide_options(p, damping=0.0, pic=0.002)
+
+
+def check_slide(p: ArgumentParser, a: Namespace) -> None:
+    """End with an error where the command line names options of a slide that is not computed, or in which water does not flow."""
+    check_effect(p, a, a.slide, SLIDE_OPTIONS, "--slide")
+    check_effect(p, a, a.slide_water == "flows", ("--slide-step",), "--slide-water flows")
 
 
 def slide_of(
@@ -74,6 +101,7 @@ def slide_of(
     step = None
     if a.slide_water == "flows":
         step, act = a.slide_step, lambda: None
+        warn_of_entering_water(slope, instant, model, a.time)
         let_water_flow(slope, instant, model)
     unbalanced = model.out_of_balance(nmd=a.slide_water == "still" and averages(a, model.laws))
     with Interrupt(comm) as interrupt:
@@ -120,6 +148,38 @@ def let_water_flow(slope: SlopeSite, instant: Instant, model: mpm.Model) -> None
     reservoirs = [condition for condition in slope.boundary if isinstance(condition, Reservoir)]
     if reservoirs:
         model.stand_water(value_at(reservoirs[0].level, instant.time))
+
+
+def rise_of_water(conductivity: ArrayLike, modulus: ArrayLike, time: float) -> Any:
+    """Head [m] by which water that enters at the surface of saturated soil without pressure raises that at the water table below.
+
+    The head is the height down to the water table, and level below it. Consolidation smooths this bend, at which it then has
+    sqrt(c t / pi), c = k M / gamma_w (Carslaw & Jaeger 1959, Conduction of heat in solids, ch. 2).
+
+    Args:
+        conductivity: k [m/s]; modulus: oedometric modulus M [Pa], of one soil or of each particle.
+        time: t [s].
+    """
+    return np.sqrt(np.multiply(conductivity, modulus) / WATER_WEIGHT * time / np.pi)
+
+
+def warn_of_entering_water(slope: SlopeSite, instant: Instant, model: mpm.Model, time: float) -> None:
+    """Warn of soil above the water table into which much water would enter at its surface within the time [s] of a slide. Collective.
+
+    Args:
+        model: the particles, as yet without water, each soil of which has two laws.
+    """
+    soils, p = by_law(slope.porous, slope.site), model.particles
+    dry, height = instant.pore_pressure(p.position) <= 0, p.position[:, -1]
+    conductivity = np.array([vertical_conductivity(soil) for soil in 2 * soils])[p.material]
+    rise = np.where(dry, rise_of_water(conductivity, model.wave_moduli()[:, 0], time), 0.0).max(initial=0.0)
+    ends = [height[rows].max(initial=-np.inf) for rows in (dry, ~dry)]
+    largest, top, table = (comm.allreduce(float(value), MPI.MAX) for value in (rise, *ends))
+    low, high = ends_of_height(slope.body[0])
+    if min(largest, top - table) > MOST_ENTERING * (high - low):
+        say(f"--slide-water is flows: soil above the water table is taken as saturated, and water enters at its surface as fast as it can flow, which "
+            f"raises the head there by some {min(largest, top - table):.2g} m in the {time:g} s of the slide, sqrt(k M t / pi gamma_w), and the slide "
+            "goes too far; take --slide-water still, or a shorter --time")  # fmt: skip
 
 
 def require_one_level(slope: SlopeSite, end: float) -> None:

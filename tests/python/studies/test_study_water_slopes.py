@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
-from study_main import main
+from study_main import ended, main
 
 from mpm_core import InputError
 
@@ -49,6 +49,20 @@ def run(name, path, folder, options):
 def test_a_wrong_site_is_named(old, new, words, tmp_path):
     with pytest.raises(InputError, match=words):
         run("drawdown", site("drawdown", tmp_path, (old, new)), tmp_path, "--days 1")
+
+
+@pytest.mark.parametrize(
+    ("study", "options", "message"),
+    [
+        ("drawdown", "--slide-water flows", "--slide-water is given, expected --slide with it"),
+        ("rain", "--slide-from lowest", "--slide-from is given, expected --slide with it"),
+        ("rain", "--time 3", "--time is given, expected --slide with it"),
+        ("drawdown", "--slide --slide-step 0.1", "--slide-step is given, expected --slide-water flows with it"),
+    ],
+)
+def test_options_of_a_slide_without_one_are_named(study, options, message, tmp_path):
+    result = ended(study, tmp_path, *options.split())
+    assert result.returncode == 2 and message in result.stderr
 
 
 def test_a_drawdown_that_is_followed_long_ends_at_the_limit_of_a_slow_one(tmp_path):

@@ -95,3 +95,56 @@ def test_a_slide_through_strata_that_dip_begins_in_equilibrium(tmp_path, without
     assert drawdown.main(options.split()) == 0
     summary = json.loads((tmp_path / "results" / "summary.json").read_text())
     assert summary["initial_out_of_balance_ratio"] < 1e-9 and summary["largest_displacement_m"] > 1e-3
+
+
+def column(conductivity, table=4.0, height=8.0):
+    """A column of soil on rigid ground in equilibrium, its site, and an instant with a water table; no water above it."""
+    cells = 2, round(4 * height) + 2
+    mesh = bridge.box_mesh(MPI.COMM_WORLD, (0.5, height + 0.5), cells, body=((0, 0), (0.5, height)))
+    model = mpm.Model(bridge.background_mesh(*mesh), [LAW, LAW])
+    model.seed(density=2000.0, per_cell=3, cell_tag=bridge.BODY)
+    for side in (1, 2):
+        model.roller(side, (1, 0))
+    model.fix(3)
+    model.set_gravity((0.0, -9.81))
+    pressure = lambda x: 9810.0 * np.maximum(table - x[:, 1], 0.0)
+    depth, p = height - model.particles.position[:, 1], pressure(model.particles.position)
+    vertical = p - 2000.0 * 9.81 * depth
+    model.particles.set("stress", np.outer(vertical, (3 / 7, 1.0, 3 / 7, 0.0)))
+    site = SimpleNamespace(laws={bridge.BODY: LAW}, cell_tags=mesh[1])
+    soil = water.PorousSoil(conductivity)
+    slope = SimpleNamespace(site=site, porous={bridge.BODY: soil}, boundary=[], body=mesh)
+    return model, slope, SimpleNamespace(time=0.0, pore_pressure=pressure)
+
+
+def test_water_that_enters_raises_the_table_as_a_bend_that_diffuses():
+    """c = k M / gamma_w = 0.137 m2/s: after 5 s the head at the table, 4 m below the surface, has risen by sqrt(c t / pi) = 0.47 m."""
+    from common.water.slides import let_water_flow, rise_of_water
+
+    model, slope, instant = column(conductivity=1e-4)
+    let_water_flow(slope, instant, model)
+    for _ in model.implicit(5.0, dt=0.1, quasi_static=True, small_displacements=True):
+        pass
+    p = model.particles
+    near = np.abs(p.position[:, 1] - 4.0) < 0.6
+    line = np.polyfit(p.position[near, 1] - 4.0, p.pore_pressure[near], 2)
+    rise = rise_of_water(1e-4, LAW.p_wave_modulus, 5.0)
+    assert rise == pytest.approx(np.sqrt(1e-4 * 10e6 * 0.7 / (1.3 * 0.4) / 9810 * 5 / np.pi))
+    assert line[-1] / 9810 == pytest.approx(rise, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("conductivity", "table", "said"), [(1e-4, 4.0, 0.47), (1e-4, 8.0, None), (1e-4, 7.7, 0.3), (1e-7, 4.0, None)]
+)
+def test_water_that_enters_a_slide_is_said(conductivity, table, said, recwarn):
+    """Where it raises the table by more than 2 % of the height, and no farther than to the surface."""
+    from common.water.slides import warn_of_entering_water
+
+    model, slope, instant = column(conductivity, table)
+    warn_of_entering_water(slope, instant, model, 5.0)
+    texts = [str(one.message) for one in recwarn if "--slide-water is flows" in str(one.message)]
+    assert len(texts) == (said is not None)
+    if said:
+        number = float(texts[0].partition("by some ")[2].split(" m ")[0])
+        assert number == pytest.approx(said, abs=0.15)
+        assert "in the 5 s of the slide" in texts[0] and "--slide-water still" in texts[0]
