@@ -211,25 +211,35 @@ class Seepage:
             Whether it converged; where not, the state is as before, and `reason` says why.
 
         Raises:
-            InputError: dt is not positive, or a boundary condition is not possible. Raised on all ranks alike.
+            InputError: dt is not positive, a boundary condition is not possible, or compressible soil would hold less than no water.
+                Raised on all ranks alike.
         """
         agree(self.domain.comm, None if is_finite(dt) and dt > 0 else f"dt is {dt!r} s, expected a positive number")
         self._take_boundary()
         self._applied.require_values(self.time + dt)
         if self._transient is None:
             self._transient = self._problem(transient=True)
+        water = self._water_in_pores()
         self._dt.value = dt
         self._old.x.array[:], self._old_load.x.array[:] = self.pressure_head.x.array, self._load.x.array
         self.time += dt
         self._set_load()
-        failure = self._solve(self._transient)
+        failure = self._solve(self._transient, water / (self._largest * dt))
         if failure:
             self.time -= dt
             self._load.x.array[:] = self._old_load.x.array
         self.reason = f"{failure}; {_SHORTER.format(dt)}" if failure else ""
         return not failure
 
-    def _solve(self, problem: Any) -> Any:
+    def _water_in_pores(self) -> float:
+        """The stored water, which pores of a compressibility in other units would have less than none of. Collective."""
+        water, largest = self.stored_water(), max(soil.compressibility for soil in self._soils)
+        agree(self.domain.comm, None if water > 0 else f"soil: the largest compressibility is {largest:g} 1/Pa, with which the pores would hold less "
+              "than no water; expected the inverse of the oedometric modulus, such as 1e-7 for 10 MPa")  # fmt: skip
+        return water
+
+    def _solve(self, problem: Any, water: float = 0.0) -> Any:
+        """Solve a problem under the conditions at the present time; water: all that there is, over a time step."""
         self._applied.set_time(self.time, float(self._dt.value) if problem is self._transient else 0.0)
         height, (fixed, values, upper) = self._applied.height, self._applied.bounds(self.time)
         heads = np.concatenate([values[fixed] + height[fixed], height])
@@ -239,7 +249,6 @@ class Seepage:
         if (
             problem is self._transient
         ):  # all water, over the step: long steps, too, are to conserve it, short ones have its round-off
-            water = self.stored_water() / (self._largest * float(self._dt.value))
             size = max(min(size, water), 1e-3 * water)
         failure = problem.solve(fixed, values, upper, size)
         self.iterations = problem.iterations

@@ -65,6 +65,23 @@ def test_options_of_a_slide_without_one_are_named(study, options, message, tmp_p
     assert result.returncode == 2 and message in result.stderr
 
 
+def test_a_reservoir_below_its_ground_is_said_with_its_file(tmp_path):
+    path = site("drawdown", tmp_path, ("[[0.0, 7.0], [3.0, 1.0]]", "-20.0"))
+    with pytest.raises(
+        InputError, match=f"{path}: the steady flow at the beginning: .*undetermined.*; levels are elevations in m"
+    ):
+        run("drawdown", path, tmp_path, "--days 1")
+
+
+@pytest.mark.parametrize("elements, said", [("P1", 1), ("P2", 0)])
+def test_linear_elements_are_said_to_be_too_stiff(elements, said, tmp_path, monkeypatch):
+    runs = importlib.import_module("common.water.runs")
+    monkeypatch.setattr(runs, "open_results", lambda *_: (_ for _ in ()).throw(InputError("no more")))
+    result = ended("drawdown", tmp_path, "--cell-size", "3", "--elements", elements)
+    assert "no more" in result.stderr
+    assert result.stderr.count("--elements is P1: linear triangles are too stiff") == said
+
+
 def test_a_drawdown_that_is_followed_long_ends_at_the_limit_of_a_slow_one(tmp_path):
     # The same boundary conditions for ever: the flow in time becomes the steady one, and with it the factor.
     path = site("drawdown", tmp_path, ("= 3e-7", "= 1e-4"), ("conductivity = 1e-7", "conductivity = 1e-4"))

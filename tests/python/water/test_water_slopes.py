@@ -50,6 +50,28 @@ def test_lowering_water_over_level_ground_changes_no_effective_stress(conductivi
         assert np.abs(fem.displacement.x.array).max(initial=0.0) < 1e-12
 
 
+def test_peat_takes_a_load_that_is_larger_than_its_modulus():
+    """m_v w is 0.5 after the step, more than the porosity of 0.4: undrained, the water still takes m_v / (m_v + n / K_w) of the load."""
+    soil = water.PorousSoil(1e-12, porosity=0.4, compressibility=1e-5)
+    loading = lambda x, time: 50.0 * time + 0 * x[:, 0]
+    _, _, flow = layer(soil, [water.Head(TOP, 3.0)], water_modulus=2.2e9, loading=loading)
+    flow.solve()
+    assert flow.advance(1000.0)
+    height = flow.pressure_head.function_space.tabulate_dof_coordinates()[:, 1]
+    rise = 9810.0 * (flow.pressure_head.x.array - (3.0 - height))[height < 2.0]
+    assert rise == pytest.approx(50e3 * 1e-5 / (1e-5 + 0.4 / 2.2e9), rel=1e-3)
+
+
+def test_a_modulus_in_the_place_of_a_compressibility_is_named():
+    soil = water.PorousSoil(1e-6, porosity=0.4, compressibility=2e7)
+    _, _, flow = layer(soil, [water.Head(BASE, -1.0)])
+    flow.solve()
+    with pytest.raises(
+        mpm.InputError, match=r"largest compressibility is 2e\+07 1/Pa, .* less than no water; expected the inverse"
+    ):
+        flow.advance(10.0)
+
+
 def test_compressible_water_takes_the_load_that_the_skeleton_leaves_it():
     # Undrained, by the storages: a load w raises the pore pressure by m_v / (m_v + n / K_w) of it (van der Kamp and Gale 1983).
     soil = water.PorousSoil(1e-9, porosity=0.4, compressibility=1e-7)
