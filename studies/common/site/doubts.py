@@ -59,6 +59,14 @@ def warn_of_depth(domain: Any, levels: Iterable[float], where: str) -> None:
             "in m, not depths or pressures")  # fmt: skip
 
 
+def warn_of_dry_level(domain: Any, levels: Iterable[float], where: str) -> None:
+    """Warn of levels of water [m] that are all below a mesh, as a depth below the ground would be; where: they stand in the file. Collective."""
+    (low, high), level = ends_of_height(domain), max(levels)
+    if level < low - 1e-9 * (high - low):
+        say(f"{where} is {level:g} m, below the base of the mesh at {low:g} m, so that all of the ground is dry: levels are elevations in m, not depths "
+            "below the ground")  # fmt: skip
+
+
 def warn_of_buoyant_weight(unit_weight: Mapping[str, float], stages: Sequence[Mapping[str, Any]], path: Path) -> None:
     """Warn of soils lighter than water in a site whose stages have water, where unit weights are those of the saturated soil.
 

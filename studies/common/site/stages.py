@@ -11,7 +11,7 @@ import numpy as np
 import fenics_bridge as bridge
 import mpm_core as mpm
 
-from .doubts import warn_of_depth, warn_of_slanting_water
+from .doubts import warn_of_depth, warn_of_dry_level, warn_of_slanting_water
 from .keys import require_push
 from .laws import is_number
 from .supports import support_of
@@ -95,7 +95,9 @@ def _water(level: Any, where: str, site: Site) -> Any:
             f"{where}: water_level is {level!r}, expected a number [m] or points [x, level] with x rising"
         )
     where = f"{where}: water_level"
-    warn_of_depth(site.domain, [height for _, height in points], where)
+    heights = [height for _, height in points]
+    warn_of_depth(site.domain, heights, where)
+    warn_of_dry_level(site.domain, heights, where)
     if len(points) > 1 and site.dimension == 2:
         warn_of_slanting_water(site.domain, site.cell_tags, site.soils, np.array(points, dtype=float), where)
     return bridge.hydrostatic(np.array(level, dtype=float))

@@ -36,6 +36,20 @@ def test_a_level_that_slopes_where_water_stands_is_doubted(tmp_path, level, slop
 
 
 @pytest.mark.parametrize(
+    "level, dry", [("-5.0", True), ("[[0, -4.5], [36, -6]]", True), ("-4.0", False), ("[[0, -3], [36, -6]]", False)]
+)
+def test_a_level_below_the_base_is_doubted(tmp_path, level, dry, recwarn):
+    """The base of the dike's ground is at -4 m: a depth of 5 m below the crest is at 3 m."""
+    path = tmp_path / "site.toml"
+    stage = f'[[stages]]\nname = "in situ"\nfill = ["bank", "ground"]\nwater_level = {level}\n'
+    path.write_text(f'extends = "{ROOT}/meshes/dike.toml"\n{stage}')
+    read_site(path, MPI.COMM_WORLD)
+    said = [str(one.message) for one in recwarn if "below the base of the mesh" in str(one.message)]
+    assert len(said) == dry
+    assert not said or "stages[0]: water_level is -" in said[0] and "base of the mesh at -4 m" in said[0]
+
+
+@pytest.mark.parametrize(
     "weight, wet, light", [(9000.0, True, True), (9000.0, False, False), (19000.0, True, False), (0.0, True, False)]
 )
 def test_a_buoyant_unit_weight_is_doubted_below_water(tmp_path, weight, wet, light, recwarn):
