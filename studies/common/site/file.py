@@ -66,6 +66,7 @@ from .mesh import check_soils, geometry_of, site_mesh
 from .stages import stage_of
 from .strength import law_of_table, ratio_of, with_strength_ratios
 from .supports import supports_of, warn_of_rigid_core
+from .undrained_doubts import soft_water_doubt
 
 
 @dataclass
@@ -289,6 +290,7 @@ def site_of(
         say(left_out_doubt(with_history, where))
         one = next(iter(own.values()))
         say(secant_doubt(one, where))
+        say(soft_water_doubt(one, where))
         say("" if soil in k0 else k0_doubt(one, ratios.get(soil, 1.0), where))
     others = {
         name: law_of_table(located(part_of(given, law_keys()), path.parent), None, f"{path}: laws.{name}")
@@ -298,6 +300,7 @@ def site_of(
         for doubt in (unit_doubt, idle_doubt, left_out_doubt):
             say(doubt(given, f"{path}: laws.{name}"))
         say(secant_doubt(others[name], f"{path}: laws.{name}"))
+        say(soft_water_doubt(others[name], f"{path}: laws.{name}"))
     members = {name: member_of(given, f"{path}: members.{name}") for name, given in table.get("members", {}).items()}
     _require_columns(members, path)
     _require_dimension(members, domain.topology.dim, path)
