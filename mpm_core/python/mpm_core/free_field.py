@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from . import _core
 from ._core import InputError
-from .ground_column import Layers
+from .ground_column import SHEAR_OF_PLANE, Layers
 from .mesh import cell_sizes
 from .resting import represented
 from .water_checks import filled_fraction
@@ -44,6 +44,9 @@ def coupled_mass(count: int, dim: int) -> float:
 def layers_at(model: Any, tag: int) -> Layers:
     """The layers between the levels of the nodes on a side, with the means of the cells there. Collective.
 
+    Level ground bears no shear stress on level planes. That of the cells, which comes from their size and from what is on the ground, is left out: a
+    layer that liquefies would lose it, and flow sideways without end under the load that it bore.
+
     Raises:
         InputError: on all ranks: a side that is not a vertical plane, or without soil.
     """
@@ -74,6 +77,8 @@ def layers_at(model: Any, tag: int) -> Layers:
     if water is not None:
         wet += dim + 4
         pores = _pores_at(0.5 * (heights[:-1] + heights[1:]), values[:, 4:wet], water, max(0.0, -model.gravity[-1]))
+    stress = values[:, wet : wet + width]
+    stress[:, SHEAR_OF_PLANE[dim][:-1]] = 0.0
     return Layers(
         heights=heights.tolist(),
         law=values[:, 0].astype(int).tolist(),
@@ -81,7 +86,7 @@ def layers_at(model: Any, tag: int) -> Layers:
         density=values[:, 2].tolist(),
         cell_size=values[:, 3].tolist(),
         pores=pores,
-        stress=values[:, wet : wet + width].tolist(),
+        stress=stress.tolist(),
         state=values[:, wet + width :].tolist(),
         normal=(normal / np.linalg.norm(normal)).tolist(),
         time=model.time,

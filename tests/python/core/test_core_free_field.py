@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from core_cases import box, by_id, moduli, run
+from mpm_core.free_field import layers_at
+from mpm_core.ground_column import Base, GroundColumn
 
 import mpm_core as mpm
 
@@ -98,6 +100,23 @@ def test_a_site_under_its_weight_stays_at_rest_and_yields_as_a_column():
             [[u[chosen & (level == k)].mean() for k in range(20)] for chosen in (side, np.abs(x - 0.25) < 0.05)]
         )
         assert np.abs(mean[0] - mean[1]).max() < 0.01 * np.abs(u).max()
+
+
+def test_a_free_field_bears_no_shear_stress_on_level_planes():
+    """Under the mirrored motion it moves the other way by as much; with 0.2 kPa from the cells beside it, it would creep as they lean."""
+    soil = mpm.MohrCoulomb(young=1e6, poisson=POISSON, cohesion=0.5e3, friction_angle=0.0)
+    model = site((2, 20), (0.1, 1.0), laws=(soil, soil))
+    model.particles.set("stress", np.tile((-3e3, -3e3, -3e3, 0.2e3), (len(model.particles), 1)))
+    layers = layers_at(model, LEFT)
+    assert np.allclose(layers.stress, (-3e3, -3e3, -3e3, 0.0))
+    time, velocity = np.array([0.0, 0.02, 0.04, 0.1]), np.array([0.0, 0.05, -0.05, 0.0])
+    moved = []
+    for sign in (1.0, -1.0):
+        base = Base((0.0, 0.0), 100.0, time, sign * velocity, np.array([1.0, 0.0]))
+        column = GroundColumn(layers, [soil, soil], base, mpm.Rayleigh())
+        times, velocities, _ = column.advance(0.0, 0.3)
+        moved.append(np.trapz(velocities[:, -1, 0], times))
+    assert abs(moved[0]) > 1e-4 and moved[0] == pytest.approx(-moved[1], rel=1e-6)
 
 
 def test_rayleigh_damping_of_the_free_field_is_that_of_the_site():
