@@ -124,7 +124,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     )
     check_motion(p, a)
     say(unit_doubt(vars(a), "the soil"))
-    say(too_coarse(a))
+    say(too_coarse(a, min(wave_speeds(a))))
     return a
 
 

@@ -19,9 +19,9 @@ from common.checks import check_cells, check_effect, check_two_cells, say
 from common.earthquake.motions import STEP, accelerations
 from common.earthquake.options import add_motion_options, check_motion
 from common.earthquake.plots import save_ground, save_record
-from common.earthquake.site import FIELDS, outcrop_motion
+from common.earthquake.site import FIELDS, outcrop_motion, too_coarse
 from common.figures import Pictures
-from common.followed import cells_near, mean_displacement, numbers_in
+from common.followed import FollowedNodes, cells_near, numbers_in
 from common.history import History
 from common.lengths import metres
 from common.movie import gathered, own_frame, particle_movie
@@ -43,6 +43,7 @@ from common.water.levee_site import (
     damping_of,
     effective_pressure,
     model_in_equilibrium,
+    speed_of_sand,
     too_loose,
     void_ratio_named,
 )
@@ -106,6 +107,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check(p, not given, lambda: f"--sanisand has '{given[0]}', expected --void-ratio {given[0].partition('=')[2]} in its place, from which the "
           "porosity and the unit weight of the sand follow too")  # fmt: skip
     say(too_loose(a))  # and names what is wrong with the parameters of the sand
+    say(too_coarse(a, speed_of_sand(a), "the sand"))
     return a
 
 
@@ -113,7 +115,10 @@ def parse(arguments: list[str] | None = None) -> Namespace:
 
 
 class Followed:
-    """Soil that the history follows: crest, toes, surface and sand of the free field, sand below a toe and the crest. Collective."""
+    """What the history follows: nodes at the crest, the surface of the free field and the toes, and sand below. Collective.
+
+    Displacements are those of the surface itself, as velocities of its nodes over time: cells beside it move less than the crest and the toes do.
+    """
 
     def __init__(self, model: mpm.Model, a: Namespace) -> None:
         left, right = a.beside, a.beside + 2 * a.slope * a.height + a.crest
@@ -123,9 +128,9 @@ class Followed:
             return numbers_in(model, cells_near(model, np.array((x, y)), reach, model.mesh.tags_of("cell", soil)))
 
         self._model = model
-        self._crest = near(middle, a.height, "levee")
-        self._ground = near(0.25 * a.beside, 0.0, "sand")
-        self._toes = near(left, 0.0, "sand"), near(right, 0.0, "sand")
+        surface = np.array([(middle, a.height), (0.25 * a.beside, 0.0), (left, 0.0), (right, 0.0)])
+        self._nodes, self._time = FollowedNodes(model, surface), 0.0
+        self._moved, self._velocity = np.zeros_like(surface), np.zeros_like(surface)
         self._sand = [near(x, depth, "sand") for x in (0.25 * a.beside, left, middle)]
         self._start = self._pressures()
 
@@ -138,11 +143,14 @@ class Followed:
         return means
 
     def row(self, time: float) -> dict[str, float]:
-        """Values of the columns."""
-        left, right = (mean_displacement(self._model, toe)[0] for toe in self._toes)
+        """Values of the columns at a time [s], after that of the row before or 0."""
+        if time > self._time:
+            before, self._velocity = self._velocity, self._nodes.velocity()
+            self._moved += 0.5 * (time - self._time) * (before + self._velocity)
+            self._time = time
+        crest, ground, left, right = self._moved
         ratios = [1 - max(now, 0.0) / start for now, start in zip(self._pressures(), self._start)]
-        crest, ground = (-mean_displacement(self._model, numbers)[1] for numbers in (self._crest, self._ground))
-        return dict(zip(COLUMNS, (time, crest, ground, right - left, *ratios)))
+        return dict(zip(COLUMNS, (time, -crest[1], -ground[1], right[0] - left[0], *ratios)))
 
 
 def shaken(a: Namespace, model: mpm.Model, until: float, folder: Path) -> tuple[History, list, mpm.Report]:

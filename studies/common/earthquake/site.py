@@ -105,15 +105,19 @@ def band_of(a: Namespace) -> tuple[float, float]:
     return 0.5 * a.frequency, a.highest_frequency if a.motion == "noise" else 2 * a.frequency
 
 
-def too_coarse(a: Namespace) -> str:
-    """A warning of cells that are too large for shear waves of the highest frequency; empty for others."""
+def too_coarse(a: Namespace, speed: float, soil: str = "the softer soil") -> str:
+    """A warning of cells that are too large for shear waves of the highest frequency; empty for others.
+
+    Args:
+        speed: of shear waves in a soil [m/s], and its name.
+    """
     highest, option = band_of(a)[1], "--highest-frequency" if a.motion == "noise" else "--frequency"
-    length = min(wave_speeds(a)) / highest
+    length = speed / highest
     if a.cell_size <= length / CELLS_OF_WAVE * (1 + 1e-9):
         return ""
     return (
         f"--cell-size is {a.cell_size:g} m, expected {length / CELLS_OF_WAVE:.3g} m at most, an eighth of a shear wave of {highest:g} Hz in "
-        f"the softer soil: higher frequencies hardly pass through larger cells; lower it or {option}"
+        f"{soil}: higher frequencies hardly pass through larger cells; lower it or {option}"
     )
 
 

@@ -145,14 +145,19 @@ def model_in_equilibrium(a: Namespace, motion: mpm.Motion) -> mpm.Model:
     return model
 
 
-def damping_of(a: Namespace) -> mpm.Rayleigh:
-    """The damping at small strains, as asked for at the first frequency of the sand and at five times that."""
+def speed_of_sand(a: Namespace) -> float:
+    """Of small shear waves in the middle of the sand beside the levee [m/s]."""
     sand, middle = loose_sand(a), 0.5 * a.sand_depth
     buoyant = unit_weights(a)["sand"] - WATER * GRAVITY
     pressure = buoyant * middle * (1 + 2 * a.poisson / (1 - a.poisson)) / 3
     stress = np.array([[-pressure] * 3 + [0.0]])
     shear = sand.wave_moduli(stress, np.zeros((1, sand.n_state)))[0, 1]
-    first = np.sqrt(shear * GRAVITY / unit_weights(a)["sand"]) / (4 * a.sand_depth)
+    return float(np.sqrt(shear * GRAVITY / unit_weights(a)["sand"]))
+
+
+def damping_of(a: Namespace) -> mpm.Rayleigh:
+    """The damping at small strains, as asked for at the first frequency of the sand and at five times that."""
+    first = speed_of_sand(a) / (4 * a.sand_depth)
     return mpm.Rayleigh.of_ratio(a.damping_ratio, (first, 5 * first))
 
 
