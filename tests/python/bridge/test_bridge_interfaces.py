@@ -1,6 +1,5 @@
 """Soil that slides along walls: cells beside them with a fraction of its strength."""
 
-
 import numpy as np
 import pytest
 from common.earth_pressure import stress_field

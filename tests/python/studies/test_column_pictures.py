@@ -1,6 +1,5 @@
 """Pictures of columns: panels beside one another, of a size that can be written."""
 
-
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest

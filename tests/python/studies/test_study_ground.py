@@ -1,6 +1,5 @@
 """Slopes on ground of the same soil, in the studies that look for collapse."""
 
-
 import collapse
 import pytest
 import safety

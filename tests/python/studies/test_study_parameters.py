@@ -1,6 +1,5 @@
 """Parameters of a study from a TOML file, and back to one."""
 
-
 import pytest
 
 from studies.common.options import add_choice, add_count, add_flag, add_number, add_switch, formerly, study_parser

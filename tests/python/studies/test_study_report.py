@@ -1,6 +1,5 @@
 """The page of a run in a browser without a window: it loads, the slider moves the particles, the mouse finds them."""
 
-
 import numpy as np
 import pytest
 from browser import NEEDED, move_slider, number_of_colours, open_page, picture, started
