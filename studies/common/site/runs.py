@@ -11,6 +11,7 @@ from time import perf_counter
 
 import numpy as np
 from mpi4py import MPI
+from mpm_core.law_warnings import locks_at_failure
 
 import fenics_bridge as bridge
 
@@ -21,7 +22,7 @@ from ..figures import Pictures
 from ..page import Page
 from ..quiet import NOT_REACHED, without_warning
 from ..results import open_results
-from ..slope.fem import finite_elements, step_line
+from ..slope.fem import finite_elements, step_line, warn_of_linear_elements
 from ..solids.member_forces import force_picture
 from ..solids.plots import captions_for, save_solid_mechanism
 from ..solids.site import solid_mechanism
@@ -30,8 +31,8 @@ from .field_plots import CAPTIONS as STRENGTHS
 from .field_plots import strength_pictures
 from .file import Site, read_site
 from .k0 import say_left_out
-from .member_results import captions as captions_of_members
 from .member_results import StageForces, force_row, last_forces, member_pictures, write_members
+from .member_results import captions as captions_of_members
 from .mesh import cell_size_of
 from .water_table import level_line
 
@@ -85,6 +86,8 @@ def site_study(
     sizes = [finest * 2**k for k in reversed(range(a.meshes))] if finest else [None]
     site, runs = read_site(a.site, comm, sizes[0]), []
     require(site)
+    if not locks_at_failure(list(site.laws.values())):  # of which the bridge warns
+        warn_of_linear_elements(a)
     folder = open_results(a, comm)
     if not at_rest:
         say_left_out(site.k0, site.overconsolidation, str(a.site))

@@ -25,6 +25,7 @@ from ..site.doubts import ends_of_height, warn_of_suction
 from ..site.field_plots import strength_pictures
 from ..site.flow_doubts import warn_of_later_changes, warn_of_sealed_ground
 from ..site.slides import CAPTIONS as SLIDE_CAPTIONS
+from ..slope.fem import warn_of_linear_elements
 from ..slope.site import SlopeSite, read_slope_site
 from ..summary import write_summary
 from .plots import CAPTIONS, slope_pictures
@@ -63,8 +64,7 @@ def water_slope_study(a: Namespace, changing: type[water.Rain] | type[water.Rese
         raise mpm.InputError(f"{a.site}: no boundary has {changing.__name__.lower()}, expected one or more")
     if a.slide and a.slide_water == "flows":
         require_one_level(slope, DAY * a.days)
-    say("--elements is P1: linear triangles are too stiff where soil flows, and factors of safety are too high, by some 20 % on cells "
-        "of a tenth of the height of a slope; take P2 but for quick looks" if a.elements == "P1" else "")  # fmt: skip
+    warn_of_linear_elements(a)
     folder = open_results(a, comm)
     flow = slope.seepage()
     try:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 from site_cases import SITE, site_in
+from study_main import ended
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -393,3 +394,15 @@ def test_layers_placed_later_are_not_compared_in_elastic_soil(tmp_path):
     assert importlib.import_module("excavation").main([str(word) for word in options]) == 0
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["difference_to_at_once"] > 1e-3 and "difference_to_at_once_elastic" not in summary
+
+
+@pytest.mark.parametrize("elements, dilation, said", [("P1", 30.0, 1), ("P1", 0.0, 0), ("P2", 30.0, 0)])
+def test_linear_elements_are_said_to_be_too_stiff(elements, dilation, said, tmp_path, monkeypatch):
+    """Where soil keeps its volume as it fails the finite elements say so themselves."""
+    runs = importlib.import_module("common.site.runs")
+    monkeypatch.setattr(runs, "open_results", lambda *_: (_ for _ in ()).throw(mpm.InputError("no more")))
+    frictional = f"friction_angle = 30.0\ndilation_angle = {dilation}"
+    path = site_in(tmp_path, SITE.replace("friction_angle = 0.0", frictional).replace('"tresca"', '"elastic"'))
+    result = ended("safety", tmp_path, "--site", path, "--elements", elements, "--meshes", "1")
+    assert "no more" in result.stderr
+    assert result.stderr.count("--elements is P1: linear triangles are too stiff") == said
