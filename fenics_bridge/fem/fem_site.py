@@ -204,7 +204,7 @@ class FemSite:
                 vertical = vertical_stress(law, present[rows], points.state[rows, : law.n_state])
             else:
                 vertical = -placed[rows, upward(placed.shape[1])]
-            found[rows] = strengths(laws[tag], ratio, vertical)
+            found[rows] = strengths(laws[tag], ratio, vertical, points.coordinates()[rows])
         return found
 
     def _enter(

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_bridge.errors import InputError, agree, is_finite
 from fenics_bridge.fem.overconsolidation import LARGEST, effective_stress, upward
-from fenics_bridge.types import Law
+from fenics_bridge.types import Law, OfPosition
 
 STRENGTH = "cohesion"
 """Parameter of a law without friction that is its undrained shear strength"""
@@ -26,6 +26,10 @@ LARGEST_RATIO = 2.0
 class StrengthRatio:
     """Undrained shear strength over vertical effective stress: s_u = ratio * sigma_v' * OCR^exponent, at least the cohesion of the law.
 
+    Where a vertical preconsolidation stress sigma_p' is given, OCR is sigma_p' / sigma_v', at least `overconsolidation`. Given again in a later stage of a
+    fill, the strength follows the consolidation: it grows by sigma_v'^(1 - exponent) up to sigma_p', and in proportion to sigma_v' beyond (Ladd 1991,
+    J. Geotech. Eng. ASCE 117, 540-615).
+
     It is the peak strength of SofteningMohrCoulomb, whose residual strength stays in proportion to it.
 
     SHANSEP (Ladd and Foott 1974, J. Geotech. Eng. Div. ASCE 100, 763-786). Without overconsolidation it is also the strength after liquefaction
@@ -35,14 +39,18 @@ class StrengthRatio:
         ratio: strength ratio S of normally consolidated soil [-].
         overconsolidation: overconsolidation ratio OCR [-].
         exponent: exponent m of OCR [-].
+        vertical_preconsolidation: largest vertical effective stress that the soil has carried [Pa], a number or a function of positions (n, D) [m] that
+            returns (n,); 0 for none.
 
     Raises:
-        InputError: ratio is not above 0 and at most 2, overconsolidation not from 1 to 100, or exponent not from 0 to 1.
+        InputError: ratio is not above 0 and at most 2, overconsolidation not from 1 to 100, exponent not from 0 to 1, or a vertical preconsolidation
+            stress below 0.
     """
 
     ratio: float
     overconsolidation: float = 1.0
     exponent: float = 0.8
+    vertical_preconsolidation: float | OfPosition = 0.0
 
     def __post_init__(self) -> None:
         wrong = None
@@ -54,12 +62,29 @@ class StrengthRatio:
             )
         elif not (is_finite(self.exponent) and 0 <= self.exponent <= 1):
             wrong = f"exponent is {self.exponent!r}, expected a number from 0 to 1, such as 0.8"
+        elif not (
+            callable(self.vertical_preconsolidation)
+            or is_finite(self.vertical_preconsolidation)
+            and self.vertical_preconsolidation >= 0
+        ):
+            wrong = f"vertical_preconsolidation is {self.vertical_preconsolidation!r}, expected a stress from 0 on [Pa], or a function of positions"
         if wrong is not None:
             raise InputError(wrong)
 
-    def __call__(self, vertical: ArrayLike) -> NDArray[np.float64]:
-        """Undrained shear strength [Pa] under vertical effective stresses [Pa], compression positive; 0 under tension. Shapes are alike."""
-        return self.ratio * self.overconsolidation**self.exponent * np.maximum(np.asarray(vertical, dtype=float), 0.0)
+    def __call__(self, vertical: ArrayLike, position: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Undrained shear strength [Pa] under vertical effective stresses [Pa], compression positive; 0 under tension. Shapes are alike.
+
+        Args:
+            vertical: vertical effective stress.
+            position: (n, D) [m], for a vertical preconsolidation stress that is a function.
+        """
+        present = np.maximum(np.asarray(vertical, dtype=float), 0.0)
+        before: ArrayLike | OfPosition = self.vertical_preconsolidation
+        if callable(before):
+            before = before(position)
+        largest = np.maximum(self.overconsolidation * present, before)
+        strength: NDArray[np.float64] = self.ratio * present ** (1 - self.exponent) * largest**self.exponent
+        return np.where(present > 0, strength, 0.0)
 
 
 def require_cohesive(
@@ -104,12 +129,15 @@ def vertical_stress(law: Law, stress: NDArray[np.float64], state: NDArray[np.flo
     return -effective_stress(law, stress, state)[:, upward(stress.shape[1])]
 
 
-def strengths(law: Law, ratio: StrengthRatio, vertical: NDArray[np.float64]) -> NDArray[np.float64]:
+def strengths(
+    law: Law, ratio: StrengthRatio, vertical: NDArray[np.float64], position: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Undrained shear strengths of points [Pa], shape (n,): by the ratio, at least the cohesion that the law itself has.
 
     Args:
         law: law of the points, which varies in its cohesion.
         ratio: strength ratio.
         vertical: vertical effective stress [Pa], compression positive, shape (n,).
+        position: (n, D) [m].
     """
-    return np.maximum(ratio(vertical), nominal_value(law, STRENGTH))
+    return np.maximum(ratio(vertical, position), nominal_value(law, STRENGTH))

@@ -277,7 +277,8 @@ class ParticleSite:
         for tag, ratio in ratios.items():
             of_soil, stress = vertical[tag]
             rows = np.flatnonzero(np.isin(p.id, of_soil))
-            values[rows] = strengths(laws[tag], ratio, stress)[np.searchsorted(of_soil, p.id[rows])]
+            here = stress[np.searchsorted(of_soil, p.id[rows])]
+            values[rows] = strengths(laws[tag], ratio, here, p.position[rows])
         p.set("state", differences_of(STRENGTH, values, self.model.laws, p.material, p.state))
 
     def _harden(self, ratios: Mapping[int, float]) -> None:

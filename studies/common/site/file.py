@@ -54,17 +54,19 @@ from .interfaces import fractions_of, in_stages, split_beside, weakened, with_ra
 from .k0 import from_the_beginning, k0_of, overconsolidation_of
 from .keys import CHANGES, STAGE_WATER, changes_of, member_of, part_of, read_site_table
 from .laws import (
+    HISTORY,
     OVERCONSOLIDATION,
     idle_doubt,
     law_keys,
     left_out_doubt,
     located,
+    numbers_of,
     unit_doubt,
     unit_weight_of,
 )
 from .mesh import check_soils, geometry_of, site_mesh
 from .stages import stage_of
-from .strength import law_of_table, ratio_of, with_strength_ratios
+from .strength import law_of_table, ratio_of, with_strength_ratios, without_history
 from .supports import supports_of, warn_of_rigid_core
 from .undrained_doubts import soft_water_doubt
 
@@ -271,7 +273,7 @@ def site_of(
         weights[soil] = unit_weight_of(given, where)
         parameters = located(part_of(given, law_keys()), path.parent)
         heights: dict[int, float] = {}
-        fields, parameters = fields_of(soil, parameters, domain.topology.dim, where)
+        fields, parameters = fields_of(soil, without_history(parameters), domain.topology.dim, where)
         random += fields
         if not set(parameters) - {"porosity"}:
             raise mpm.InputError(f"{where} has no law, which this study needs: material, and the parameters of the law")
@@ -284,7 +286,7 @@ def site_of(
             law = law_of_table(parameters, None, where, fields)
             own = dict.fromkeys(bridge.names_of(cell_tags).get(soil, (soil,)), law)
         laws |= own
-        say(unit_doubt(parameters, where, heights.values()))
+        say(unit_doubt(parameters | numbers_of(given, HISTORY), where, heights.values()))
         with_history = part_of(given, (*law_keys(), OVERCONSOLIDATION))
         say(idle_doubt(with_history, where))
         say(left_out_doubt(with_history, where))

@@ -27,6 +27,8 @@ OVERCONSOLIDATION = "overconsolidation"
 """Key of a soil whose law remembers the largest stress that it has carried"""
 RATIO, EXPONENT = "strength_ratio", "strength_exponent"
 """Keys of a law without friction whose undrained strength follows the vertical effective stress"""
+HISTORY = "vertical_preconsolidation"
+"""Key of such a law, and of Hardening Soil, for the largest vertical effective stress before"""
 COHESIVE = ("tresca", "mohr-coulomb", "viscoplastic", "softening")
 """Materials that may have a strength ratio"""
 OF_UMAT = ("properties", "strength_properties", "variables")
@@ -121,7 +123,7 @@ def without_effect(table: Mapping[str, Any]) -> list[str]:
     idle |= set(KINDS) - {kind} if kind in KINDS else set()
     idle |= set() if table.get("undrained", False) else {"water_modulus"}
     idle |= set() if table.get("small_strain_modulus") else {"threshold_strain"}
-    idle |= set() if has_ratio(table) else {RATIO, EXPONENT}
+    idle = idle - {HISTORY} if has_ratio(table) else idle | {RATIO, EXPONENT}
     idle |= set() if kind in ("hardening-soil", "cam-clay") or has_ratio(table) else {OVERCONSOLIDATION}
     idle |= {"preconsolidation"} if OVERCONSOLIDATION in table else set()
     idle |= set() if table.get("creep") else {"reference_time"}
@@ -235,7 +237,7 @@ def is_profile(value: dict) -> bool:
 
 
 MODULI = ("young", "secant_modulus", "oedometer_modulus", "unloading_modulus", "small_strain_modulus")
-STRESSES = ("vertical_preconsolidation", "reference_pressure")
+STRESSES = (HISTORY, "reference_pressure")
 LEAST = dict.fromkeys(MODULI, 1e5) | dict.fromkeys(STRENGTHS, 50.0) | dict.fromkeys(STRESSES, 1e3)
 """Parameters [Pa] below which a soil of a site is probably given in kPa or MPa"""
 
@@ -256,6 +258,11 @@ def unit_doubt(parameters: Mapping[str, Any], where: str, heights: Collection[fl
             return f"{where}: {name} is {value:g} Pa{most}, which hardly any soil has: stresses and moduli are in Pa, such as 10e3 for 10 kPa"
     modulus = parameters.get("water_modulus")
     return soft_water(f"{where}: water_modulus", modulus) if is_number(modulus) and modulus > 0 else ""
+
+
+def numbers_of(table: Mapping[str, Any], *keys: str) -> dict[str, Any]:
+    """The numbers of a table with some keys."""
+    return {key: table[key] for key in keys if is_number(table.get(key))}
 
 
 def is_number(value: Any) -> bool:

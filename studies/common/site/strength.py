@@ -9,7 +9,7 @@ Example of a file:
     [laws.liquefied]
     material = "tresca"
     strength_ratio = 0.06              # undrained strength over vertical effective stress; with overconsolidation = 2 and
-                                       # strength_exponent = 0.8 times 2^0.8
+                                       # strength_exponent = 0.8 times 2^0.8, or with a vertical_preconsolidation [Pa] over it
     shear_strength = 500.0             # Pa, the least strength
 
     [[stages]]
@@ -24,12 +24,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge.fem.strength_ratio import STRENGTH
 
 from .fields import SoilField, varying
-from .laws import EXPONENT, OVERCONSOLIDATION, RATIO, has_ratio, law_at
+from .laws import EXPONENT, HISTORY, OVERCONSOLIDATION, RATIO, has_ratio, is_profile, law_at
 
 if TYPE_CHECKING:
     from .file import Site
@@ -48,11 +50,27 @@ def ratio_of(table: Mapping[str, Any], where: str) -> bridge.StrengthRatio | Non
     if not has_ratio(table):
         return None
     given = {name: table[key] for name, key in (("ratio", RATIO), ("exponent", EXPONENT)) if key in table}
+    if HISTORY in table:
+        given[HISTORY] = _history(table[HISTORY], where)
     try:
         return bridge.StrengthRatio(overconsolidation=table.get(OVERCONSOLIDATION, 1.0), **given)
     except mpm.InputError as error:
-        key = "" if str(error).startswith(OVERCONSOLIDATION) else "strength_"
+        key = "" if str(error).startswith((OVERCONSOLIDATION, HISTORY)) else "strength_"
         raise mpm.InputError(f"{where}: {key}{error}") from None
+
+
+def _history(value: Any, where: str) -> Any:
+    """A vertical preconsolidation stress as a `StrengthRatio` takes it: a number, or a function of positions where it grows with depth."""
+    if not isinstance(value, dict):
+        return value
+    if not is_profile(value):
+        raise mpm.InputError(f"{where}: {HISTORY} is {value}, expected a number or {{value = , per_metre = , top = }}")
+    return lambda x: value["value"] + value["per_metre"] * np.maximum(value["top"] - x[:, -1], 0.0)
+
+
+def without_history(table: dict[str, Any]) -> dict[str, Any]:
+    """The table of a law without the vertical preconsolidation stress that belongs to its strength ratio; as it is without a ratio."""
+    return {key: value for key, value in table.items() if key != HISTORY} if has_ratio(table) else table
 
 
 def law_of_table(table: dict[str, Any], height: float | None, where: str, fields: Sequence[SoilField] = ()) -> Any:
@@ -61,7 +79,7 @@ def law_of_table(table: dict[str, Any], height: float | None, where: str, fields
     Raises:
         InputError: the strength is a random field and follows the vertical effective stress.
     """
-    names = [field.parameter for field in fields]
+    table, names = without_history(table), [field.parameter for field in fields]
     if has_ratio(table) and STRENGTH in names:
         raise mpm.InputError(f"{where} has {RATIO}, and its strength is a random field, expected one of them")
     return varying(law_at(table, height, where), [*names, *([STRENGTH] if has_ratio(table) else [])])

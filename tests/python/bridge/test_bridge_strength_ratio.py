@@ -50,6 +50,58 @@ def test_a_formula_of_shansep():
     assert bridge.StrengthRatio(0.06)(50e3) == pytest.approx(3e3)
 
 
+def test_strength_grows_slowly_up_to_the_preconsolidation_and_in_proportion_beyond():
+    ratio = bridge.StrengthRatio(0.25, exponent=0.8, vertical_preconsolidation=100e3)
+    assert ratio(np.array([50e3, 100e3, 200e3, 0.0])) == pytest.approx(
+        [0.25 * 50e3 * 2**0.8, 0.25 * 100e3, 0.25 * 200e3, 0.0]
+    )
+    growing = bridge.StrengthRatio(0.25, exponent=0.8, vertical_preconsolidation=lambda x: 10e3 * x[:, 0])
+    assert growing([50e3, 50e3], np.array([[10.0, 0.0], [1.0, 0.0]])) == pytest.approx(
+        [0.25 * 50e3 * 2**0.8, 0.25 * 50e3]
+    )
+    with pytest.raises(bridge.InputError, match="vertical_preconsolidation is -1.0, expected a stress from 0 on"):
+        bridge.StrengthRatio(0.25, vertical_preconsolidation=-1.0)
+
+
+def in_order(particles, name):
+    return getattr(particles, name)[np.argsort(particles.id)]
+
+
+@pytest.mark.parametrize("method", ["elements", "particles"])
+def test_strength_follows_the_consolidation_under_a_fill(ground, method):
+    """Named again after the fill has consolidated: nothing is forgotten of a preconsolidation stress that grows with depth."""
+    law, fill = undrained(least=1.0), 40e3
+
+    def before(x):
+        return 60e3 + 5e3 * (HEIGHT - x[:, -1])
+
+    ratio = {SOIL: bridge.StrengthRatio(0.25, exponent=0.8, vertical_preconsolidation=before)}
+    stages = (
+        beginning(),
+        bridge.Stage("undrained", law={SOIL: law}, strength_ratio=ratio),
+        bridge.Stage("fill", law={SOIL: DRAINED}, pressure={"top": fill}),
+        bridge.Stage("consolidated", law={SOIL: law}, strength_ratio=ratio),
+    )
+    if method == "elements":
+        site = site_of(ground, {SOIL: DRAINED}, degree=2)
+    else:
+        site = particles_of(ground, [DRAINED, law], {SOIL: 0})
+    for number, stage in enumerate(stages):
+        stress = None if method == "elements" else in_order(site.model.particles, "stress")
+        site.carry_out(stage)
+        if number not in (1, 3):
+            continue
+        if method == "elements":
+            place, strength = site.fem.points.coordinates(), site.fem.points.state[:, OVER] + 1.0
+            vertical = WEIGHT * (HEIGHT - place[:, 1]) + (fill if number == 3 else 0.0)
+        else:
+            place, state = (in_order(site.model.particles, name) for name in ("position", "state"))
+            strength, vertical = state[:, OVER] + 1.0, -stress[:, 1]  # of their cells, before the change of the law
+        largest = np.maximum(vertical, before(place))
+        assert strength == pytest.approx(0.25 * vertical**0.2 * largest**0.8, rel=1e-3)
+        assert 0.1 < (largest > vertical).mean() < 0.9
+
+
 def test_level_ground_has_it_from_its_weight_and_water_table(ground):
     """In elements, whose stresses under the weight are exact at the points of quadratic ones, and in particles."""
     law, table = undrained(), bridge.hydrostatic(4.0)

@@ -238,3 +238,18 @@ def test_soil_beside_a_wall_has_a_fraction_of_the_strength_of_the_ratio(tmp_path
     beside = np.abs(share - 0.5) < 1e-3
     assert 0.01 < beside.mean() < 0.3
     assert share[~beside] == pytest.approx(1.0, rel=1e-3)
+
+
+def test_a_preconsolidation_stress_that_grows_with_depth_gives_the_strength(tmp_path):
+    history = "vertical_preconsolidation = {value = 60e3, per_metre = 5e3, top = 4.0}"
+    text = SITE.replace("strength_ratio = 0.25", f"strength_ratio = 0.25\nstrength_exponent = 0.5\n{history}")
+    site = read_site(site_in(tmp_path, text), COMM)
+    ratio = site.strength_ratio["clay"]
+    assert ratio(np.array([20e3, 20e3]), np.array([[0.0, 4.0], [0.0, 2.0]])) == pytest.approx(
+        [0.25 * np.sqrt(20e3 * 60e3), 0.25 * np.sqrt(20e3 * 70e3)]
+    )
+    assert len(site.laws) == 3  # one for each soil: the law itself is the same at all heights
+    with pytest.raises(mpm.InputError, match="soils.clay: vertical_preconsolidation is {.*}, expected a number or"):
+        read_site(site_in(tmp_path, text.replace("top = 4.0", "bottom = 4.0")), COMM)
+    with pytest.warns(RuntimeWarning, match="vertical_preconsolidation is 60 Pa"):
+        read_site(site_in(tmp_path, text.replace(history, "vertical_preconsolidation = 60.0")), COMM)
