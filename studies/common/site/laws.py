@@ -251,7 +251,7 @@ def unit_doubt(parameters: Mapping[str, Any], where: str, heights: Collection[fl
     """
     for name, least in LEAST.items():
         value, most = parameters.get(name), ""
-        if isinstance(value, dict):
+        if isinstance(value, dict) and heights:
             value, most = max(_at_height(name, value, height) for height in heights), " at most"
         fluid = name == "young" and is_number(parameters.get("poisson")) and parameters["poisson"] > 0.49
         if is_number(value) and 0 < value < least and not fluid:

@@ -253,3 +253,12 @@ def test_a_preconsolidation_stress_that_grows_with_depth_gives_the_strength(tmp_
         read_site(site_in(tmp_path, text.replace("top = 4.0", "bottom = 4.0")), COMM)
     with pytest.warns(RuntimeWarning, match="vertical_preconsolidation is 60 Pa"):
         read_site(site_in(tmp_path, text.replace(history, "vertical_preconsolidation = 60.0")), COMM)
+
+
+def test_a_law_of_a_stage_may_have_a_preconsolidation_stress_that_grows_with_depth(tmp_path):
+    history = "vertical_preconsolidation = {value = 60e3, per_metre = 5e3, top = 4.0}\n"
+    site = read_site(
+        site_in(tmp_path, SITE + LAW.replace("overconsolidation = 3\n", history) + STAGES + UNDRAINED), COMM
+    )
+    ratio = site.stages[-1].strength_ratio["sand"]
+    assert ratio(30e3, np.array([[0.0, 0.0]])) == pytest.approx(0.2 * 30e3**0.3 * 80e3**0.7)
