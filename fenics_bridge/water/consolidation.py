@@ -316,8 +316,8 @@ class Consolidation(ConsolidationResults):
             dt: length of the step [s].
 
         Returns:
-            Report of the step; a step that fails changes nothing. One in which soil moves by a tenth of the body has
-            failed: it collapses.
+            Report of the step; a step that fails changes nothing. One in which soil moves by a tenth of the body, or after
+            which it has moved so far sideways, has failed: it collapses.
 
         Raises:
             InputError: dt is not positive, or a load or boundary condition is not possible. Raised on all ranks alike.
@@ -336,7 +336,10 @@ class Consolidation(ConsolidationResults):
             self.motion.begin(dt)
         report, active, iterations, reason = self._solved(external, load.displacement, end, dt, stored)
         if self.motion is None and not reason:
-            reason = collapsed(self._body.increment.x.array[self._displacements[1]], self.domain)
+            step, before = (
+                function.x.array[self._displacements[1]] for function in (self._body.increment, self._body.solution)
+            )
+            reason = collapsed(step, before, self.domain)
         if reason:
             return ConsolidationReport(self.time, dt, iterations, report.residuals, reason=reason)
         self._inflow = self._step_state(dt)[1]

@@ -20,7 +20,7 @@ MOST_SETS = 30
 """Guesses of where a pressure is at its upper bound, in a step."""
 
 COLLAPSE = 0.1
-"""Of the size of a body, by which soil does not move in one quasi-static step, and beyond which strains are not small."""
+"""Of the size of a body, by which soil does not move in a quasi-static step, nor sideways in all, and beyond which strains are not small."""
 
 SLACK = 1e-9
 """By how much, relative to the largest, a head may exceed its bound or a flow have the wrong sign."""
@@ -165,12 +165,20 @@ def accepted(report: NewtonReport, solver: Solver) -> NewtonReport:
     return report._replace(converged=True, reason="")
 
 
-def collapsed(displacements: NDArray[np.float64], domain: Mesh) -> str:
+def collapsed(step: NDArray[np.float64], before: NDArray[np.float64], domain: Mesh) -> str:
     """Why the displacements [m] of a step are none of equilibrium; empty where they may be. Collective.
 
-    At collapse residuals hardly depend on the motion of the mechanism, so that Newton's method may end anywhere along it.
+    At collapse residuals hardly depend on the motion of the mechanism, so that Newton's method may end anywhere along it. Soft ground may settle by
+    more than a tenth of its thickness, but a mechanism moves sideways as well.
+
+    Args:
+        step: displacements in the step, shape (n * D,).
+        before: displacements at its start.
+        domain: the mesh.
     """
-    largest, most = _largest_and_most(displacements, domain)
+    moved, most = _largest_and_most(step, domain)
+    sideways, _ = _largest_and_most((before + step).reshape(-1, domain.geometry.dim)[:, :-1], domain)
+    largest = max(moved, sideways)
     return f"it collapses: soil would move by {largest:.2g} m, more than {most:.2g} m" if largest > most else ""
 
 

@@ -41,6 +41,19 @@ void check_names(const L& law, const std::vector<std::string>& names)
   }
 }
 
+/// Points have the state variables of the law itself, with which they begin.
+template <class L>
+void check_states(const L&, const std::vector<std::string>&)
+{
+}
+void check_states(const HardeningSoil& law, const std::vector<std::string>& names)
+{
+  if (law.small_strain_modulus == 0 && std::count(names.begin(), names.end(), "small_strain_modulus"))
+    throw InputError(
+        "varying has 'small_strain_modulus', which is 0 in the law, expected a law in which it is above the "
+        "shear modulus of unloading: points with small-strain stiffness have more state variables");
+}
+
 /// Whether two points have the same values
 template <int D>
 bool are_alike(const PointBatch<D>& points, int first_column, int columns, Index one, Index other)
@@ -100,7 +113,13 @@ std::vector<std::string> state_names(const Heterogeneous& law)
 void check(const Heterogeneous& law)
 {
   check(law.law);
-  std::visit([&](const auto& l) { check_names(l, law.varying); }, law.law);
+  std::visit(
+      [&](const auto& l)
+      {
+        check_names(l, law.varying);
+        check_states(l, law.varying);
+      },
+      law.law);
   if (n_state(law) > max_states)
     throw InputError("varying has " + std::to_string(law.varying.size()) + " names, too many for this law");
 }

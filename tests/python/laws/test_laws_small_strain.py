@@ -152,6 +152,19 @@ def test_modulus_below_that_of_unloading_is_refused():
     assert small_strain_sand(small_strain_modulus=0.0).n_state == sand().n_state == 3
 
 
+def test_the_modulus_varies_from_point_to_point_where_the_law_has_one():
+    base = small_strain_sand(**LAW)
+    law, stress = mpm.Heterogeneous(base, ["small_strain_modulus"]), np.tile(isotropic(1e6), (2, 1))
+    state = np.zeros((2, law.n_state))
+    state[:, 1:3] = 1.0, 10.0
+    state[1, -1] = 50e6
+    law.update(np.tile(1e-7 * np.array([2 / 3, -1 / 3, -1 / 3, 0, 0, 0]), (2, 1)), stress, state)
+    moduli = (stress[:, 0] - stress[:, 1]) / 2e-7
+    assert moduli == pytest.approx([G0, G0 + 50e6], rel=1e-6)
+    with pytest.raises(mpm.InputError, match="varying has 'small_strain_modulus', which is 0 in the law"):
+        mpm.Heterogeneous(sand(), ["small_strain_modulus"])
+
+
 def test_states_have_names():
     names = small_strain_sand().state_names
     assert names[3] == "largest_small_strain"
