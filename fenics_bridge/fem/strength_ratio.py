@@ -77,10 +77,17 @@ class StrengthRatio:
         Args:
             vertical: vertical effective stress.
             position: (n, D) [m], for a vertical preconsolidation stress that is a function.
+
+        Raises:
+            InputError: position is None and the vertical preconsolidation stress is a function.
         """
         present = np.maximum(np.asarray(vertical, dtype=float), 0.0)
         before: ArrayLike | OfPosition = self.vertical_preconsolidation
         if callable(before):
+            if position is None:
+                raise InputError(
+                    "position is None, expected positions (n, D), since vertical_preconsolidation is a function of them"
+                )
             before = before(position)
         largest = np.maximum(self.overconsolidation * present, before)
         strength: NDArray[np.float64] = self.ratio * present ** (1 - self.exponent) * largest**self.exponent
