@@ -176,28 +176,35 @@ def collapsed(step: NDArray[np.float64], before: NDArray[np.float64], domain: Me
         before: displacements at its start.
         domain: the mesh.
     """
-    moved, most = _largest_and_most(step, domain)
-    sideways, _ = _largest_and_most((before + step).reshape(-1, domain.geometry.dim)[:, :-1], domain)
-    largest = max(moved, sideways)
+    sideways = (before + step).reshape(-1, domain.geometry.dim)[:, :-1]
+    largest, most = max(_largest(step, domain), _largest(sideways, domain)), COLLAPSE * float(_extents(domain).max())
     return f"it collapses: soil would move by {largest:.2g} m, more than {most:.2g} m" if largest > most else ""
 
 
 def warn_of_large_strains(displacements: NDArray[np.float64], domain: Mesh) -> bool:
-    """Warn where displacements [m] are beyond what small strains are; returns whether they are. Collective."""
-    largest, most = _largest_and_most(displacements, domain)
+    """Warn where displacements [m] are beyond what small strains are; returns whether they are. Collective.
+
+    Ground is compressed over its height, which is often a small part of its width.
+    """
+    largest, most = _largest(displacements, domain), COLLAPSE * float(_extents(domain)[domain.geometry.dim - 1])
     if largest > most:
         warnings.warn(
-            f"soil has moved by {largest:.2g} m, more than a tenth of the body: finite elements take strains for small, and refer them to the undeformed "
-            "ground, so that settlements are too large by about half of the strain; particles (`--particles`) move with the soil",
+            f"soil has moved by {largest:.2g} m, more than a tenth of the height of the body: finite elements take strains for small, and refer them to "
+            "the undeformed ground, so that settlements are too large by about half of the strain; particles (`--particles`) move with the soil",
             RuntimeWarning,
             stacklevel=2,
         )
     return largest > most
 
 
-def _largest_and_most(displacements: NDArray[np.float64], domain: Mesh) -> tuple[float, float]:
-    """The largest displacement, and a tenth of the size of the body [m]. Collective."""
+def _largest(displacements: NDArray[np.float64], domain: Mesh) -> float:
+    """The largest displacement [m]. Collective."""
+    return max(domain.comm.allgather(float(np.abs(displacements).max(initial=0.0))))
+
+
+def _extents(domain: Mesh) -> NDArray[np.float64]:
+    """The size of the body along each axis [m]. Collective."""
     x, comm = domain.geometry.x, domain.comm
     ends = (-x.min(axis=0), x.max(axis=0)) if len(x) else (np.full(3, -np.inf),) * 2
-    size = np.max(comm.allgather(ends), axis=0).sum(axis=0).max()
-    return max(comm.allgather(float(np.abs(displacements).max(initial=0.0)))), COLLAPSE * float(size)
+    size: NDArray[np.float64] = np.max(comm.allgather(ends), axis=0).sum(axis=0)
+    return size

@@ -480,17 +480,18 @@ def test_soft_clay_creeps_on_when_its_water_is_out(tmp_path):
     assert abs(slope[0.0]) < 1e-5
 
 
-def test_settlements_of_more_than_a_tenth_of_the_body_are_warned_of_and_are_no_collapse(tmp_path):
+@pytest.mark.parametrize("width", [0.5, 20.0])
+def test_settlements_of_more_than_a_tenth_of_the_height_are_warned_of_and_are_no_collapse(tmp_path, width):
     from common.consolidation.site import read_consolidation_site
 
     from fenics_bridge import water
 
-    text = f'extends = "{STUDIES.parent}/meshes/soft_clay.toml"\ncell_size = 1.0\n[soils.clay]\nconductivity = 1e-6\n'
+    text = f'extends = "{STUDIES.parent}/meshes/soft_clay.toml"\ncell_size = 1.0\n[soils.clay]\nconductivity = 1e-6\n[constants]\nwidth = {width}\n'
     (tmp_path / "site.toml").write_text(text)
     model = read_consolidation_site(tmp_path / "site.toml", MPI.COMM_SELF).at_rest(water.Element.TAYLOR_HOOD)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         assert model.run(86400.0 * 200, 86400.0, 1.3)[-1].converged
-    found = [str(one.message) for one in said if "more than a tenth of the body" in str(one.message)]
+    found = [str(one.message) for one in said if "more than a tenth of the height of the body" in str(one.message)]
     assert len(found) == 1
     assert -model.displacement.x.array.min() > 0.5
