@@ -45,16 +45,22 @@ class ExcessScale:
     limits: tuple[float, float]
     enlarged: float
 
+    @property
+    def title(self) -> str:
+        """What the pictures say of the factor."""
+        return "Displacements to scale" if self.enlarged == 1 else f"Displacements magnified {self.enlarged:g} times"
+
     @classmethod
     def of(cls, pictures: Sequence[ExcessPicture]) -> ExcessScale:
-        """The largest displacement is a twentieth of the ground's height."""
+        """The largest displacement is a twentieth of the ground's height, or its true size where that is more."""
         height = np.ptp(pictures[0].excess.points[:, 1])
         largest = max(np.abs(picture.moved).max() for picture in pictures)
         every = np.concatenate([EXCESS.scale * picture.excess.values[:, 0] for picture in pictures])
         # What falls below zero by a little takes its colour.
         least = 0.0 if every.min() > -0.03 * every.max() else every.min()
         ticks = ROUND_TICKS.tick_values(least, max(every.max(), least + 1e-6))
-        return cls((ticks[0], ticks[-1]), float(f"{0.05 * height / largest:.1g}") if largest > 0 else 1.0)
+        enlarged = max(float(f"{0.05 * height / largest:.1g}"), 1.0) if largest > 0 else 1.0
+        return cls((ticks[0], ticks[-1]), enlarged)
 
 
 def save_excess(path: Path, pictures: Sequence[ExcessPicture]) -> None:
@@ -78,7 +84,7 @@ def _excess_figure(pictures: Sequence[ExcessPicture], scale: ExcessScale) -> Fig
         _draw_excess(axes, picture, scale.enlarged, levels)
         axes.set(aspect="equal", xlim=(low[0], high[0]))
         axes.set_ylim(low[1], high[1] + 0.06 * (high[1] - low[1]))
-    figure.suptitle(f"Displacements magnified {scale.enlarged:g} times", fontsize=9)
+    figure.suptitle(scale.title, fontsize=9)
     label_axes(panels, axis_labels(pictures[0].excess.half_section))
     bar = figure.colorbar(
         ScalarMappable(Normalize(*scale.limits), EXCESS.colours), ax=panels.ravel().tolist(), shrink=0.8, pad=0.01

@@ -495,3 +495,17 @@ def test_settlements_of_more_than_a_tenth_of_the_height_are_warned_of_and_are_no
     found = [str(one.message) for one in said if "more than a tenth of the height of the body" in str(one.message)]
     assert len(found) == 1
     assert -model.displacement.x.array.min() > 0.5
+
+
+@pytest.mark.parametrize(
+    ("settlement", "title"), [(0.02, "Displacements magnified 20 times"), (1.0, "Displacements to scale")]
+)
+def test_pictures_of_consolidation_do_not_reduce_displacements(settlement, title):
+    from common.consolidation.plots import ExcessPicture, ExcessScale
+    from common.field_plots import Field
+
+    points, cells = np.array([(0.0, 0.0), (20.0, 0.0), (20.0, 8.0), (0.0, 8.0)]), np.array([(0, 1, 2), (0, 2, 3)])
+    moved = np.array([(0.0, 0.0), (0.0, 0.0), (0.0, -settlement), (0.0, -settlement)])
+    scale = ExcessScale.of([ExcessPicture("After 1 day", Field(points, cells, np.full((4, 1), 1e3)), moved)])
+    assert scale.enlarged == max(0.05 * 8 / settlement, 1.0)  # a twentieth of the height, or as large as it is
+    assert scale.title == title
