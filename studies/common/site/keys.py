@@ -154,8 +154,13 @@ def _require_member(given: Any, where: str) -> None:
     kind = given.get("kind") if isinstance(given, dict) else None
     if not isinstance(kind, str) or kind not in MEMBERS:
         raise mpm.InputError(f"{where}: kind is {kind!r}, expected one of {', '.join(map(repr, MEMBERS))}")
-    arguments = [name for name in signature(MEMBERS[kind]).parameters if name not in ("start", "end", "points")]
+    arguments = {
+        name: one for name, one in signature(MEMBERS[kind]).parameters.items() if name not in ("start", "end", "points")
+    }
     _require_known(given, ("kind", "points", *arguments, *([INTERFACE] if kind == "beam" else [])), where)
+    missing = [name for name, one in arguments.items() if one.default is one.empty and name not in given]
+    if missing:
+        raise mpm.InputError(f"{where} has no {' and no '.join(missing)}, expected the {kind}'s own (docs/members.md)")
 
 
 def member_of(given: Mapping[str, Any], where: str) -> mpm.Member:
@@ -176,8 +181,6 @@ def member_of(given: Mapping[str, Any], where: str) -> mpm.Member:
         return mpm.strut(*ends, **arguments)
     except mpm.InputError as error:
         raise mpm.InputError(f"{where}: {error}") from None
-    except TypeError as error:  # an argument without a default is not there
-        raise mpm.InputError(f"{where}: {str(error).partition(') ')[2] or error}") from None
 
 
 def require_push(pressure: float, where: str) -> None:
