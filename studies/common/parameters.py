@@ -95,8 +95,9 @@ def present_name(name: str, actions: Sequence[argparse.Action]) -> str:
 
 
 def did_you_mean(word: str, names: Iterable[str]) -> str:
-    """What a message adds for a word that is nearly one of some names; empty where it is not."""
-    near = get_close_matches(word, list(names), cutoff=0.8)
+    """What a message adds for a word that is nearly one of some names, or the beginning of some; empty where it is not."""
+    names = list(names)
+    near = get_close_matches(word, names, cutoff=0.8) or [name for name in names if name.startswith(f"{word}_")]
     return f"; did you mean {' or '.join(near)}?" if near else ""
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from studies.common.options import add_choice, add_count, add_flag, add_number, add_switch, formerly, study_parser
-from studies.common.parameters import write_parameters
+from studies.common.parameters import unknown_key, write_parameters
 
 
 def parser():
@@ -93,3 +93,10 @@ def test_an_option_goes_by_its_former_name_with_a_warning(tmp_path):
         with pytest.warns(FutureWarning, match="the option --mesh-width is now called --cell-size"):
             assert p.parse_args(arguments).cell_size == 2
     assert "mesh-width" not in p.format_help()
+
+
+def test_the_first_word_of_a_key_names_the_key():
+    known = ["compressibility", "compression_slope", "swelling_slope", "cohesion"]
+    assert unknown_key("compression", known) == "unknown key 'compression'; did you mean compression_slope?"
+    assert unknown_key("swelling", known) == "unknown key 'swelling'; did you mean swelling_slope?"
+    assert "expected some of" in unknown_key("c", known)
