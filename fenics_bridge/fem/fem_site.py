@@ -21,7 +21,7 @@ from fenics_bridge.fem.quasi_static import QuasiStatic
 from fenics_bridge.fem.small_strains import without_memory
 from fenics_bridge.fem.stages import SiteState, Stage, StageError, StageReport, require_stages
 from fenics_bridge.fem.strength_ratio import STRENGTH, StrengthRatio, strengths, vertical_stress
-from fenics_bridge.mesh.names import known_tags, label, tag_numbers
+from fenics_bridge.mesh.names import group_label, known_tags, tag_numbers
 from fenics_bridge.types import Law, OfPosition
 
 
@@ -68,7 +68,7 @@ class FemSite:
             comm,
             lambda given, argument: tag_numbers(comm, fem.cell_tags, given, argument, "cell"),
             lambda given, argument: tag_numbers(comm, fem.facet_tags, given, argument),
-            name_of=lambda tag: label(fem.cell_tags, tag),
+            name_of=lambda tag: group_label(fem.cell_tags, tag),
             supports=fem.supports,
             require_members=self._require_members,
         )
