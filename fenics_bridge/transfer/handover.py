@@ -23,7 +23,7 @@ from fenics_bridge.fem.geometry import Geometry, require_same_geometry
 from fenics_bridge.fem.loads import Load
 from fenics_bridge.fem.pseudo_static import forces_per_volume
 from fenics_bridge.fem.quasi_static import QuasiStatic
-from fenics_bridge.mesh.names import tag_numbers
+from fenics_bridge.mesh.names import known_tags, tag_numbers
 from fenics_bridge.transfer.dried import balance_dried_soil
 from fenics_bridge.transfer.moved import fitted_volumes, held_volumes, volume_change
 from fenics_bridge.transfer.pore_pressures import (
@@ -307,7 +307,7 @@ def _warn_of_other_weight(model: mpm.Model, fem: Any) -> None:
     if not isinstance(fem, QuasiStatic):
         return
     towards = _direction_of_gravity(model)
-    carried = [float(force @ towards) for force in forces_per_volume(fem.load, model.mesh.dim)] or [0.0]
+    carried = [float(force @ towards) for force in forces_per_volume(_named_weights(fem), model.mesh.dim)] or [0.0]
     p, gravity = model.particles, float(np.linalg.norm(model.gravity))
     own = gravity * p.mass / p.volume
     low = model.comm.allreduce(float(own.min(initial=np.inf)), MPI.MIN)
@@ -321,6 +321,15 @@ def _warn_of_other_weight(model: mpm.Model, fem: Any) -> None:
             RuntimeWarning,
             stacklevel=3,
         )
+
+
+def _named_weights(fem: QuasiStatic) -> Load:
+    """The load without the unit weight of all other soils where there are none: after stages it is zero. Collective."""
+    weights = fem.load.unit_weight
+    there = set(known_tags(fem.domain.comm, fem.cell_tags)) - set(fem.off)
+    if not isinstance(weights, dict) or not there or there.difference(weights):
+        return fem.load
+    return replace(fem.load, unit_weight={tag: weight for tag, weight in weights.items() if tag in there})
 
 
 def _direction_of_gravity(model: mpm.Model) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 import pytest
 from bridge_cases import POISSON, YOUNG, slope_model, slope_particles
+from dolfinx.mesh import compute_midpoints, meshtags
 from handover_cases import UNIT_WEIGHT, solved
 from mpi4py import MPI
 
@@ -184,3 +185,36 @@ def test_gravity_that_still_rises_is_refused_and_said():
     particles.set_gravity(particles.gravity)
     bridge.initialise(particles, elements)
     assert particles.particles.stress[:, 1].min() < -0.7 * UNIT_WEIGHT  # the slope is 1 m high
+
+
+@pytest.mark.parametrize(
+    ("densities", "said"), [((1600.0, 2000.0), ""), ((800.0, 2000.0), "8000"), ((1600.0, 3000.0), "30000")]
+)
+def test_particles_of_another_weight_are_said_after_stages(densities, said):
+    domain, _, facet_tags = bridge.box_mesh(MPI.COMM_WORLD, (2.0, 2.0), (4, 4))
+    middle = compute_midpoints(domain, 2, np.arange(domain.topology.index_map(2).size_local, dtype=np.int32))
+    cell_tags = meshtags(
+        domain, 2, np.arange(len(middle), dtype=np.int32), np.where(middle[:, 1] < 1, 1, 2).astype(np.int32)
+    )
+    bridge.name_tags(cell_tags, {"clay": 1, "fill": 2})
+    soil = mpm.LinearElastic(young=20e6, poisson=0.3)
+    supports = [bridge.fixed(3)]
+    fem = bridge.QuasiStatic(domain, soil, facet_tags, supports, degree=1, cell_tags=cell_tags)
+    weights = {"clay": 16e3, "fill": 20e3}
+    list(
+        bridge.carry_out(
+            bridge.FemSite(fem),
+            [bridge.Stage(soil, fill=[soil], unit_weight={soil: weights[soil]}) for soil in weights],
+        )
+    )
+    model = mpm.Model(bridge.background_mesh(domain, cell_tags, facet_tags), soil)
+    for name, density in zip(weights, densities):
+        model.seed(density=density, per_cell=3, cell_tag=name)
+    bridge.apply_supports(model, supports)
+    model.set_gravity((0.0, -10.0))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        bridge.initialise(model, fem, equilibrate=False)
+    found = [str(one.message) for one in caught if "unit weight of particles" in str(one.message)]
+    expected = f"the unit weight of particles is {said} N/m3, density times gravity, that of the finite elements 16000 to 20000 N/m3"
+    assert len(found) == bool(said) and all(text.startswith(expected) for text in found)
