@@ -62,8 +62,8 @@ class ReinforcedBody:
             wrong = wrong or next(filter(None, (_no_shell(name, one) for name, one in members.items())), None)
         if members and getattr(self._body.kinematics, "factored", False):
             wrong = (
-                f"there are some with nmd=True in more than {AVERAGED_LIMIT} nodes of three dimensions, expected degree=2, or the "
-                f"option -{self._options_prefix}pc_type lu"
+                f"there are some with nmd=True in more than {AVERAGED_LIMIT} nodes of three dimensions, expected a factorisation, by "
+                f"PETSC_OPTIONS='-{self._options_prefix}pc_type lu' in the environment (docs/solvers.md), or elements of degree=2"
             )
         agree(comm, wrong and f"{where}members: {wrong}")
         return self._members.prepared(members, active, where)
