@@ -16,10 +16,11 @@ if TYPE_CHECKING:
 YIELDS_ABOVE = 0.2
 """Plastic work over the energy at work above which a body counts as one that fails"""
 
+BESIDE_AVERAGES = ", best together with integration=MIXED"
 LOCKING = (
     "the soil fails, and its dilation angle is below its friction angle, so that its volume hardly changes; linear cells "
     "then overestimate the strength (volumetric locking), the more the coarser the mesh. Use nmd=True, which averages "
-    "volumetric strains, best together with integration=MIXED (docs/howto/switches.md)"
+    f"volumetric strains{BESIDE_AVERAGES} (docs/howto/switches.md)"
 )
 GATHERING = (
     "the soil fails with nmd=True and integration=PARTICLES: particles gather in some cells, and the slide goes too far, the "
@@ -38,7 +39,8 @@ class FailureWatch:
     def __init__(self, model: Model, options: Any) -> None:
         self._warning = ""
         if not options.nmd and locks_at_failure(model.laws):
-            self._warning = LOCKING
+            mixed = options.integration == Integration.MIXED
+            self._warning = LOCKING.replace(BESIDE_AVERAGES, "") if mixed else LOCKING
         elif (
             options.nmd and options.integration == Integration.PARTICLES and integration_of(model) == Integration.MIXED
         ):
