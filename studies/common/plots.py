@@ -37,7 +37,7 @@ MEMBER = "#c8401c"
 CURVES = ("#0b559f", "#c8401c", "#2a8a4a", "#7a4fa3", "#444444", "#d49a00")
 DASHES = ("-", "--", ":")
 """Of curves that are more than there are colours"""
-MOST_WITHIN, IN_A_COLUMN = 9, 20
+MOST_WITHIN, IN_A_COLUMN = 5, 20
 """Names of curves within their axes, and in a column beside them, at most"""
 WIDTH = 6.9  # in; a page's text width
 DISPLACEMENT = Quantity("Total displacement", "m", colours="viridis")
