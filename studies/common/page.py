@@ -55,7 +55,7 @@ def write_page(
     Call it on the first rank, when everything else is written.
     """
     page = page or Page()
-    title, subtitle = _heading(options.description)
+    title, subtitle = _heading(options)
     numbers, sections, curves = _sorted_out(results)
     save_report(folder / "report.html", Report(
         title=title,
@@ -77,9 +77,14 @@ def seconds_since_start() -> float:
     return time.time() - STARTED
 
 
-def _heading(description: str) -> tuple[str, str]:
-    """Title and subtitle from the first sentence of a study's description, cut at its colon."""
-    first = " ".join(description.strip().split("\n\n")[0].split())
+def _heading(options: Options) -> tuple[str, str]:
+    """Title and subtitle: the site of a user's own, which the description does not know, else the description's first sentence, cut at its colon."""
+    site, usual = getattr(options, "site", None), [
+        action.default for action in options.actions if action.dest == "site"
+    ]
+    if site is not None and site not in usual:
+        return f"Site {Path(site).stem}", f"Study {options.study}"
+    first = " ".join(options.description.strip().split("\n\n")[0].split())
     title, colon, rest = first.partition(": ")
     return (title, rest[:1].upper() + rest[1:]) if colon else (first.rstrip("."), "")
 

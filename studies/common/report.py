@@ -127,7 +127,7 @@ def name_and_unit(column: str) -> tuple[str, str]:
     if found is None:
         return _words(column), "-"
     unit = found.group(1).replace("_per_", "/").replace("2", "\u00b2").replace("3", "\u00b3")
-    unit = unit.replace("seconds", "s").replace("Ns", "N s").replace("Nm", "N m").replace(".", " ")
+    unit = unit.replace("seconds", "s").replace("Ns", "N s").replace("Nm", "N m").replace(".", " ").replace("_", " ")
     return _words(column[: found.start()]), unit
 
 

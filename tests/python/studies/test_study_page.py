@@ -2,6 +2,8 @@
 
 import json
 import re
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from PIL import Image
 
 from particle_player import Movie
 from studies.common import movie
-from studies.common.page import TITLES, _facts
+from studies.common.page import TITLES, _facts, _heading
 from studies.common.parameters import Parameter
 from studies.common.plots import DISPLACEMENT, SHEAR_STRAIN, VERTICAL_STRESS, Scene
 from studies.common.report import Report, name_and_unit, save_report
@@ -99,9 +101,23 @@ def test_names_of_columns_are_words_with_units():
     assert name_and_unit("yield_acceleration_m_per_s2") == ("Yield acceleration", "m/s\u00b2")
     assert name_and_unit("momentum_x_N.s") == ("Momentum x", "N s") == name_and_unit("momentum_x_Ns")
     assert name_and_unit("force_normal_N") == ("Force normal", "N") and name_and_unit("mass_kg") == ("Mass", "kg")
+    assert name_and_unit("wall_moment_N_m_per_m") == ("Wall moment", "N m/m")
     assert name_and_unit("computing_seconds") == ("Computing", "s") and name_and_unit("bearing_factor_Nc")[1] == "-"
 
 
 def test_the_computing_time_of_a_part_is_not_taken_for_that_of_the_run():
     assert _facts({"factor_of_safety": 1.25, "wall_seconds": 3.0, "steps": 7}) == {"Factor of safety": "1.25"}
     assert name_and_unit("wall_seconds") == ("Computing time without pictures", "s")
+
+
+@pytest.mark.parametrize(
+    ("site", "heading"),
+    [
+        ("my/pit.toml", ("Site pit", "Study excavation")),
+        ("meshes/excavation.toml", ("An excavation in stages", "A pit is dug.")),
+    ],
+)
+def test_the_heading_names_a_site_of_the_user(site, heading):
+    usual = [SimpleNamespace(dest="site", default=Path("meshes/excavation.toml"))]
+    text = "An excavation in stages: a pit is dug.\n\nMore."
+    assert _heading(SimpleNamespace(site=Path(site), actions=usual, study="excavation", description=text)) == heading
