@@ -56,6 +56,7 @@ from .keys import CHANGES, STAGE_WATER, changes_of, member_of, part_of, read_sit
 from .laws import (
     HISTORY,
     OVERCONSOLIDATION,
+    creep_doubt,
     idle_doubt,
     law_keys,
     left_out_doubt,
@@ -290,6 +291,7 @@ def site_of(
         with_history = part_of(given, (*law_keys(), OVERCONSOLIDATION))
         say(idle_doubt(with_history, where))
         say(left_out_doubt(with_history, where))
+        say(creep_doubt(parameters, where))
         one = next(iter(own.values()))
         say(secant_doubt(one, where))
         say(soft_water_doubt(one, where))
@@ -299,7 +301,7 @@ def site_of(
         for name, given in table.get("laws", {}).items()
     }
     for name, given in table.get("laws", {}).items():
-        for doubt in (unit_doubt, idle_doubt, left_out_doubt):
+        for doubt in (unit_doubt, idle_doubt, left_out_doubt, creep_doubt):
             say(doubt(given, f"{path}: laws.{name}"))
         say(secant_doubt(others[name], f"{path}: laws.{name}"))
         say(soft_water_doubt(others[name], f"{path}: laws.{name}"))

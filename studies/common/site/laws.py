@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 from collections.abc import Collection, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -99,7 +100,13 @@ def law_at(table: dict, height: float | None, where: str) -> Any:
     try:
         return law_of(argparse.Namespace(**values))
     except mpm.InputError as error:
-        raise mpm.InputError(f"{where}: {error}{place}") from None
+        raise mpm.InputError(f"{where}: {_in_keys(str(error), table)}{place}") from None
+
+
+def _in_keys(text: str, table: Mapping[str, Any]) -> str:
+    """A message of the law in a table, with the keys of the table in the place of the law's parameters."""
+    others = OPTION_OF if _kind_of(table) == "cam-clay" else {}
+    return re.sub(r"\b(compression|swelling)\b", lambda found: others.get(found.group(), found.group()), text)
 
 
 def _kind_of(table: Mapping[str, Any]) -> str:
@@ -242,6 +249,10 @@ LEAST = dict.fromkeys(MODULI, 1e5) | dict.fromkeys(STRENGTHS, 50.0) | dict.fromk
 """Parameters [Pa] below which a soil of a site is probably given in kPa or MPa"""
 
 
+MOST_CREEP = 0.1
+"""Creep over the compression slope, C_alpha / C_c (Mesri and Godlewski 1977: 0.02 to 0.1), above which it is probably a mistake"""
+
+
 def unit_doubt(parameters: Mapping[str, Any], where: str, heights: Collection[float] = ()) -> str:
     """A warning of stiffness, of soil or water, or strength in another unit than Pa; empty where there is no doubt, as for films that keep their volume.
 
@@ -263,6 +274,23 @@ def unit_doubt(parameters: Mapping[str, Any], where: str, heights: Collection[fl
 def numbers_of(table: Mapping[str, Any], *keys: str) -> dict[str, Any]:
     """The numbers of a table with some keys."""
     return {key: table[key] for key in keys if is_number(table.get(key))}
+
+
+def creep_doubt(parameters: Mapping[str, Any], where: str) -> str:
+    """A warning of soft clay that creeps faster than any soil; empty for others.
+
+    Args:
+        parameters: of a law; where: they stand in the file.
+    """
+    creep, compression = parameters.get("creep"), parameters.get("compression_slope")
+    if _kind_of(parameters) != "cam-clay" or not (
+        is_number(creep) and is_number(compression) and creep > MOST_CREEP * compression > 0
+    ):
+        return ""
+    return (
+        f"{where}: creep is {creep:g}, {creep / compression:.2g} of compression_slope, expected {MOST_CREEP:g} of it at most, as of peat: it is "
+        "C_alpha / 2.303, and C_alpha / C_c of soil is 0.01 to 0.1 (docs/howto/soils.md)"
+    )
 
 
 def is_number(value: Any) -> bool:
