@@ -44,9 +44,13 @@ def test_a_bar_and_soil_share_the_force_of_a_plate_by_their_stiffness(options):
 
 def test_averages_in_three_dimensions_name_the_option_by_which_they_take_members():
     # A mesh of 225 nodes
-    law, nail = mpm.LinearElastic(young=1e6, poisson=0.3), mpm.bar([(0.1, 0.5, 0.5), (1.9, 0.5, 0.5)], axial_stiffness=1e6)
+    law, nail = mpm.LinearElastic(young=1e6, poisson=0.3), mpm.bar(
+        [(0.1, 0.5, 0.5), (1.9, 0.5, 0.5)], axial_stiffness=1e6
+    )
     fem = body((2.0, 1.0, 1.0), (8, 4, 4), law, [bridge.fixed(LEFT)], degree=1, nmd=True)
-    with pytest.raises(mpm.InputError, match=r"in more than 100 nodes .* by PETSC_OPTIONS='-fem_pc_type lu' in the environment"):
+    with pytest.raises(
+        mpm.InputError, match=r"in more than 100 nodes .* by PETSC_OPTIONS='-fem_pc_type lu' in the environment"
+    ):
         fem.reconfigure(members={"nail": nail})
 
 

@@ -162,7 +162,9 @@ def test_a_wall_with_an_interface_that_the_mesh_does_not_follow_is_an_error_that
 
 
 def test_a_message_names_a_soil_whose_cells_beside_a_wall_have_a_tag_of_their_own(tmp_path):
-    text = '[members.wall]\ninterface_strength = 0.5\n[[stages]]\nname = "in situ"\nfill = ["ground", "cut 1", "cut 2"]\n'
+    text = (
+        '[members.wall]\ninterface_strength = 0.5\n[[stages]]\nname = "in situ"\nfill = ["ground", "cut 1", "cut 2"]\n'
+    )
     with pytest.warns(RuntimeWarning, match="no stage fills the cells of 'cut 3'"):
         site = site_in(tmp_path, text + '[[stages]]\nname = "dig"\ninstall = ["wall"]\nexcavate = "cut 3"\n')
     with pytest.raises(mpm.InputError, match="stage 'dig': excavate: the soil 'cut 3' is not there"):
