@@ -180,6 +180,8 @@ class ConsolidationSite:
         k0, ratios = (of_soils(there, given) for given in (self.site.k0, self.site.overconsolidation))
         stage = bridge.Stage("beginning", there, unit_weight=self.site.unit_weight, pressure=load.pressure, k0=k0,
                              overconsolidation=ratios, pore_pressure=pressure, install=dict(self.stages[0].members))  # fmt: skip
+        # Ground at rest may have no equilibrium under a weight in kN/m3, and its error does not say why.
+        warn_of_weight(fem.domain.comm, bridge.Load(unit_weight=self.site.unit_weight), fem.cell_tags)
         try:
             bridge.FemSite(fem).carry_out(stage)
         except bridge.StageError as error:

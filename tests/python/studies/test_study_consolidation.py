@@ -509,3 +509,20 @@ def test_pictures_of_consolidation_do_not_reduce_displacements(settlement, title
     scale = ExcessScale.of([ExcessPicture("After 1 day", Field(points, cells, np.full((4, 1), 1e3)), moved)])
     assert scale.enlarged == max(0.05 * 8 / settlement, 1.0)  # a twentieth of the height, or as large as it is
     assert scale.title == title
+
+
+def test_a_unit_weight_in_kn_is_named_also_where_ground_at_rest_has_no_equilibrium(tmp_path):
+    from common.consolidation.site import read_consolidation_site
+
+    import mpm_core as mpm
+    from fenics_bridge import water
+
+    (tmp_path / "site.toml").write_text(
+        f'extends = "{STUDIES.parent}/meshes/soft_clay.toml"\ncell_size = 1.0\n[soils.clay]\nunit_weight = 16\nattraction = 5e3\nk0 = 0.8\n'
+    )
+    site = read_consolidation_site(tmp_path / "site.toml", MPI.COMM_SELF)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        with pytest.raises((mpm.InputError, mpm.RunError)):
+            site.at_rest(water.Element.STABILISED, nmd=True)
+    assert any("the unit weight of 'clay' is 16 N/m3" in str(one.message) for one in said)
