@@ -43,7 +43,7 @@ class FemSite:
     def __init__(
         self,
         fem: QuasiStatic,
-        first_step: float = 0.25,
+        first_step: float | None = None,
         tolerance: float = 1e-3,
         progress: Callable[[LoadStep], Any] | None = None,
     ) -> None:

@@ -11,13 +11,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 from mpm_core.checks import positive
-from mpm_core.step_control import StepControl
+from mpm_core.step_control import StepControl, first_part
 
 from fenics_bridge.errors import InputError
 from fenics_bridge.fem.equilibration import EquilibriumReport
 from fenics_bridge.fem.loads import Load
 
 _MOST_STEPS = 1000
+FIRST_STEP = 0.25
+"""First step that applies a load, as a fraction of the way [-], unless soil has a small-strain stiffness"""
 FAR = 1e6
 """Way in first steps beyond which a value without a bound has shown no failure"""
 
@@ -152,13 +154,15 @@ def print_step(step: LoadStep) -> None:
 
 
 def raise_load(
-    model: Any, load: Load, first_step: float, tolerance: float, progress: Callable[[LoadStep], Any] | None
+    model: Any, load: Load, first_step: float | None, tolerance: float, progress: Callable[[LoadStep], Any] | None
 ) -> list[LoadStep]:
     """Raise the load of a model from its present one to the given one, by `advance` over the fraction of the way.
 
-    Sets `converged` of the model to whether the load was reached, and warns if it was not. Collective.
+    Sets `converged` of the model to whether the load was reached, and warns if it was not. Without a first step it follows from the laws of the
+    model. Collective.
     """
     start = model.load
+    first_step = first_part(model.laws, FIRST_STEP) if first_step is None else first_step
     _warn_of_unmoved(model, load)
     steps = advance(
         lambda fraction: model.equilibrate(start.towards(load, fraction)),

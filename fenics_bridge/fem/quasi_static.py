@@ -321,7 +321,7 @@ class QuasiStatic(ReinforcedBody, WetBody, SupportedBody, PointFunctions):
     def solve(
         self,
         load: Load,
-        first_step: float = 0.25,
+        first_step: float | None = None,
         tolerance: float = 1e-3,
         progress: Callable[[LoadStep], Any] | None = None,
     ) -> list[LoadStep]:
@@ -331,7 +331,7 @@ class QuasiStatic(ReinforcedBody, WetBody, SupportedBody, PointFunctions):
 
         Args:
             load: load at the end.
-            first_step: first step as a fraction of the way [-].
+            first_step: first step as a fraction of the way [-]; by default 0.25, and 0.05 where soil has a small-strain stiffness.
             tolerance: fraction of the way below which steps end [-].
             progress: function that is called with each load step, e.g. `print_step`.
 

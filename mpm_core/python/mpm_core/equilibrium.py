@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ._core import InputError, Integration, RunError
 from .implicit import Stepper
 from .report import ImplicitReport
+from .step_control import first_part
 
 if TYPE_CHECKING:
     from .model import Model
@@ -41,7 +42,7 @@ def refuse_beyond_equilibrium(model: Model, integration: Integration | None) -> 
 def find_equilibrium(model: Model, solver: Any, options: Any, tolerance: float, max_steps: int) -> ImplicitReport:
     """Quasi-static steps at the present time until the particles balance their loads.
 
-    The out-of-balance force is applied at once, or in parts where that fails. The steps that apply it move the particles; the
+    The out-of-balance force is applied at once, or in parts where that fails or soil has a small-strain stiffness. The steps that apply it move the particles; the
     steps that follow do not, because a particle could cross between two cells for ever, driven by the jump of the nodal forces
     at each crossing. The forces of the ghost penalty, which are part of a step's equilibrium but not of the particles', decrease
     from step to step. Supports with a prescribed velocity stand still.
@@ -67,6 +68,7 @@ def _found_equilibrium(model: Model, solver: Any, options: Any, tolerance: float
     options.at_rest = True  # laws that depend on rate end where slow loading has them
     stepper = Stepper(model, solver, options, 1.0)
     control = stepper.control  # of the fraction of what is out of balance that a step applies
+    control.length = first_part(model.laws, control.length)
     applied, ghost = 0.0, options.ghost
     for _ in range(max_steps):
         while True:

@@ -5,10 +5,27 @@ Implicit steps use it, load steps of finite elements, and steps of their consoli
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 MAX_CUTS = 10
 """A step is not made shorter than the longest one / 2^MAX_CUTS."""
+
+SMALL_PART = 0.05
+"""First part of a load that soil with a small-strain stiffness bears. Its stiffness falls to a fourth within the first strains, while it begins to
+yield: a step across both makes a settlement in first loading too large, by a fifth where the whole load comes at once."""
+
+
+def first_part(laws: Iterable[Any], usual: float) -> float:
+    """The first part of a load [-]: the usual one, or `SMALL_PART` where soil has a small-strain stiffness.
+
+    Args:
+        laws: of the soils.
+        usual: part of other laws [-].
+    """
+    has_bricks = any(name.startswith("brick_") for law in laws for name in law.state_names)
+    return min(usual, SMALL_PART) if has_bricks else usual
 
 
 @dataclass

@@ -98,3 +98,30 @@ def test_ground_forgets_the_small_strains_of_its_first_stage_alone(fem, tmp_path
         assert (largest[-1] > 0) == (np.abs(there[:, 4:]).max() > 0)
     assert largest[0] == 0.0
     assert 1e-6 < largest[1] < 1e-4
+
+
+def test_first_loading_of_ground_with_a_small_strain_stiffness_settles_as_its_points(tmp_path):
+    """Points of level ground, which are compressed in 400 increments, have the settlement of stages by default steps.
+
+    In a single step for the whole weight it would be 30 % larger.
+    """
+    soils, weight, k0 = SOILS["column"], 20e3, 1 - np.sin(np.radians(35.0))
+    law = sand(small_strain_modulus=112.5e6)
+    stages = [
+        bridge.Stage("in situ", fill=soils, unit_weight=dict.fromkeys(soils, weight), k0=dict.fromkeys(soils, k0)),
+        bridge.Stage("heavier", unit_weight=dict.fromkeys(soils, 1.5 * weight)),
+    ]
+    expected, depths = 0.0, 6.0 * (np.arange(12) + 0.5) / 12
+    for vertical in weight * depths:
+        test = mpm.ElementTest(law, -vertical * np.array([k0, 1.0, k0, 0.0]))
+        for factor in np.linspace(1.0, 1.5, 401)[1:]:
+            test.step([0.0, None, 0.0, 0.0], stress=[0.0, -factor * vertical, 0.0, 0.0])
+        expected -= 6.0 / len(depths) * test.strain[1]
+    mesh = mesh_of("column", tmp_path)
+    site = site_of(mesh, dict.fromkeys(soils, law), first_step=None)
+    list(bridge.carry_out(site, stages))
+    assert -site.fem.displacement.x.array.min() == pytest.approx(expected, rel=0.02)
+    model = mpm.Model(bridge.background_mesh(*mesh), law)
+    particles = bridge.ParticleSite(model, dict.fromkeys(soils, 0), ROLLERS, small_displacements=True)
+    list(bridge.carry_out(particles, stages))
+    assert -model.particles.displacement[:, 1].min() == pytest.approx(expected, rel=0.05)
