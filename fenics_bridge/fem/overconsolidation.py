@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -36,9 +36,14 @@ def hardening_soil_in(law: Law) -> mpm.HardeningSoil | None:
 
 
 def require_history(
-    comm: MPI.Comm, where: str, laws: Mapping[int, Law], ratios: Mapping[int, float], name_of: Any
+    comm: MPI.Comm,
+    where: str,
+    laws: Mapping[int, Law],
+    ratios: Mapping[int, float],
+    name_of: Any,
+    stressed: Collection[int],
 ) -> None:
-    """Require laws that an overconsolidation ratio has an effect on. Collective.
+    """Require laws that an overconsolidation ratio has an effect on, and stresses of CamClay that it multiplies. Collective.
 
     Args:
         comm: the ranks.
@@ -46,9 +51,10 @@ def require_history(
         laws: by cell tag.
         ratios: overconsolidation ratios [-], by cell tag.
         name_of: function of a tag that gives the name of its soil.
+        stressed: tags of the soils that come with stresses.
 
     Raises:
-        InputError: the law of a soil is another one. Raised on all ranks alike.
+        InputError: the law of a soil is another one, or soil of CamClay comes without stress. Raised on all ranks alike.
     """
     problems = (
         f"{where}overconsolidation is {ratio:g} for the soil {name_of(tag)}, whose law is {laws[tag].name}, expected HardeningSoil or CamClay with "
@@ -57,6 +63,18 @@ def require_history(
         if soil_with_history(laws[tag]) is None
     )
     agree(comm, next(problems, None))
+    free = (tag for tag in before_equilibrium(ratios, laws) if tag not in stressed)
+    agree(comm, next((_without_stress(where, laws[tag], ratios[tag], name_of(tag)) for tag in free), None))
+
+
+def _without_stress(where: str, law: Law, ratio: float, name: str) -> str:
+    """What is wrong with an overconsolidation ratio of CamClay that comes free of stress, with the K0 of Mayne and Kulhawy (1982)."""
+    normal = normal_k0(soil_with_history(law))
+    return (
+        f"{where}overconsolidation is {ratio:g} for the soil {name}, which comes free of stress, expected k0 with it (or stress, in a Stage): the "
+        f"preconsolidation pressure of CamClay is that of so many times the stress with which the soil comes. By K0nc OCR^sin(phi) k0 is about "
+        f"{normal * ratio ** (1 - normal):.2g}"
+    )
 
 
 def hardened(law: Law, stress: NDArray[np.float64], state: NDArray[np.float64], ratio: float) -> NDArray[np.float64]:

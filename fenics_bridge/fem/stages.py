@@ -312,11 +312,12 @@ class SiteState:
             laws: laws by cell tag, of these soils at least.
 
         Raises:
-            InputError: the law of a soil has no memory of it. Raised on all ranks alike.
+            InputError: the law of a soil has no memory of it, or soil of CamClay has neither K0 nor stresses. Raised on all ranks alike.
         """
         where = f"stage {stage.name!r}: "
         ratios = self._by_soil(where + "overconsolidation", stage.overconsolidation)
-        require_history(self._comm, where, laws, ratios, self._name_of)
+        stressed = self.k0_of(stage) if stage.stress is None else ratios
+        require_history(self._comm, where, laws, ratios, self._name_of, stressed)
         return ratios
 
     def strength_ratio_of(self, stage: Stage, laws: Mapping[int, Law]) -> dict[int, StrengthRatio]:

@@ -132,10 +132,12 @@ class ParticleSite:
             if tag in weak
         }
         self._strengthen(weak, vertical, laws)
+        harden = partial(self._harden, before_equilibrium(ratios, laws))
         if at_rest:
-            harden = partial(self._harden, before_equilibrium(ratios, laws))
             given, admissible = place_at_rest(model, at_rest, placed, harden)
             warn_beyond_strength(model.comm, f"stage {stage.name!r}: ", given, admissible)
+        else:
+            harden()  # of the stresses that the stage gives
         self._weigh(state)
         apply_supports(model, state.supports)
         self._load(state)

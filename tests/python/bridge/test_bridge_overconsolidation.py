@@ -255,3 +255,29 @@ def test_cam_clay_keeps_its_stress_at_rest_and_settles_by_its_overconsolidation(
     strain = compressed_clay(SURCHARGE, 4 * SURCHARGE)
     assert strain > 0.05
     assert moved[-1] == pytest.approx(strain * HEIGHT, rel=0.01)
+
+
+@pytest.mark.parametrize("method", ["elements", "particles"])
+def test_cam_clay_is_elastic_under_stresses_that_a_stage_gives_with_an_overconsolidation(ground, method):
+    """As clay whose preconsolidation pressure is far above all stresses."""
+    at_rest = -SURCHARGE * np.array([1 - 3 / 7, 1.0, 1 - 3 / 7, 0.0])
+    stage = beginning(weight=2e3, stress=lambda x: np.tile(at_rest, (len(x), 1)))
+    hard = mpm.CamClay(**{p.name: getattr(CLAY, p.name) for p in CLAY.parameters} | {"preconsolidation": 10e6})
+    moved = []
+    for law, ratios in ((CLAY, {SOIL: RATIO}), (hard, {})):
+        model = mpm.Model(bridge.background_mesh(*ground), [law])
+        particles = bridge.ParticleSite(model, {SOIL: 0}, ROLLERS, small_displacements=True)
+        site = particles if method == "particles" else site_of(ground, {SOIL: law})
+        moved.append(site.carry_out(replace(stage, overconsolidation=ratios)).largest_displacement)
+    assert moved[0] == pytest.approx(moved[1], rel=1e-6)
+
+
+def test_an_overconsolidation_of_cam_clay_that_comes_free_of_stress_is_refused(ground):
+    """K0nc OCR^sin(phi), where sin(phi) = 3 M / (6 + M) = 3/7 and K0nc = 4/7, is 0.77 for a ratio of 2."""
+    model = mpm.Model(bridge.background_mesh(*ground), [CLAY])
+    for site in (site_of(ground, {SOIL: CLAY}), bridge.ParticleSite(model, {SOIL: 0}, ROLLERS)):
+        with pytest.raises(
+            bridge.InputError, match=r"the soil 'clay', which comes free of stress, expected k0 .* k0 is about 0.77"
+        ):
+            site.carry_out(beginning(overconsolidation={SOIL: RATIO}))
+        assert site.number == 0 and site.state.there == ()
