@@ -73,11 +73,14 @@ def parse(arguments: list[str] | None = None) -> Namespace:
     check(p, not cyclic or a.pressure > 0,
           lambda: f"--pressure is {a.pressure:g} Pa, expected above 0 for cycles of --stress-ratio times the pressure")  # fmt: skip
     own = bool(a.python_law or a.umat)
-    check_effect(
-        p, a, own or a.material == "viscoplastic", ("--rate",), "--material viscoplastic, --python-law or --umat"
-    )
+    creeps = a.material == "cam-clay" and a.creep > 0
+    check_effect(p, a, own or creeps or a.material == "viscoplastic", ("--rate",),
+                 "--material viscoplastic, --material cam-clay and --creep, --python-law or --umat")  # fmt: skip
     check(p, own or a.material != "viscoplastic" or a.rate is not None,
           "--material is viscoplastic, expected --rate with it: in an infinitely slow test the viscosity has no effect")  # fmt: skip
+    lacking = "0 for cycles, which have" if cyclic else "--rate with it: without one, the test has"
+    check(p, own or not creeps or a.rate is not None,
+          lambda: f"--creep is {a.creep:g}, expected {lacking} no duration, so that the soil does not creep")  # fmt: skip
     say(in_percent(a))
     say(low_pressure("--pressure", a.pressure))
     return a

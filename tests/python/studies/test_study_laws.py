@@ -155,6 +155,16 @@ def test_a_law_of_ones_own(tmp_path):
     assert summary(tmp_path / "out")["q_Pa"] == pytest.approx(1e6 * 0.2)
 
 
+def test_clay_that_creeps_has_the_strength_of_its_rate(tmp_path):
+    """Ten times as fast, q and p with the attraction are larger by 10^(mu / lambda), in the critical state q = M p."""
+    clay = "--material cam-clay --test undrained --pressure 50e3 --preconsolidation 50e3 --attraction 1e3 --creep 0.005 --strain 0.3".split()
+    strengths = []
+    for rate in ("1e-7", "1e-6"):
+        assert ended("element_test", tmp_path / rate, *clay, "--rate", rate).returncode == 0
+        strengths.append(summary(tmp_path / rate)["q_Pa"])
+    assert strengths[1] / strengths[0] == pytest.approx(10 ** (0.005 / 0.1), rel=1e-3)
+
+
 @pytest.mark.parametrize(
     "options, named",
     [(["--material", "marble"], "--material is 'marble', expected one of"), (["--poisson", "0.6"], "--poisson is '0.6'"),
