@@ -181,7 +181,7 @@ def warn_beyond_strength(
     if count and comm.rank == 0:
         warnings.warn(
             f"{where}k0: the stresses are beyond the strength of the soil at {count / total:.1%} of the points that have K0, and are brought back "
-            "to it: K0 is below that of active or above that of passive earth pressure there",
+            "to it: K0 is below that of active or above that of passive earth pressure there, or the preconsolidation pressure is below the stress",
             RuntimeWarning,
             stacklevel=3,
         )

@@ -15,7 +15,7 @@ import mpm_core as mpm
 from .checks import check_effect, say
 from .options import add_choice, add_code, add_number, add_switch
 from .parameters import did_you_mean
-from .site.hardening_doubts import secant_doubt
+from .site.law_doubts import DOUBTS
 
 MATERIALS = (
     "mohr-coulomb",
@@ -150,9 +150,14 @@ def check_law_options(parser: argparse.ArgumentParser, options: argparse.Namespa
         check_effect(parser, options, options.material in materials, names, f"--material {' or '.join(materials)}")
     umat = ("--properties", "--strength-properties", "--variables")
     check_effect(parser, options, options.umat is not None, umat, "--umat")
-    if options.material == "hardening-soil" and not own:
+    check_effect(
+        parser, options, own or options.small_strain_modulus > 0, ("--threshold-strain",), "--small-strain-modulus"
+    )
+    check_effect(parser, options, own or options.creep > 0, ("--reference-time",), "--creep")
+    if options.material in ("hardening-soil", "cam-clay") and not own:
         with suppress(mpm.InputError):  # said where the law is made
-            say(secant_doubt(law_of(options), "--material hardening-soil"))
+            for doubt in DOUBTS:
+                say(doubt(law_of(options), f"--material {options.material}"))
 
 
 def given_law(a: argparse.Namespace) -> str:

@@ -49,14 +49,13 @@ from ..slope.case import GRAVITY
 from ..stages.flow import with_steady_flow
 from .doubts import warn_of_buoyant_weight, warn_of_pressures, warn_of_water
 from .fields import SoilField, fields_of, values_of
-from .hardening_doubts import k0_doubt, secant_doubt
+from .hardening_doubts import k0_doubt
 from .interfaces import fractions_of, in_stages, split_beside, weakened, with_ratios_beside
 from .k0 import from_the_beginning, k0_of, overconsolidation_of
 from .keys import CHANGES, STAGE_WATER, changes_of, member_of, part_of, read_site_table
 from .laws import (
     HISTORY,
     OVERCONSOLIDATION,
-    creep_doubt,
     idle_doubt,
     law_keys,
     left_out_doubt,
@@ -65,11 +64,11 @@ from .laws import (
     unit_doubt,
     unit_weight_of,
 )
+from .law_doubts import DOUBTS
 from .mesh import check_soils, geometry_of, site_mesh
 from .stages import stage_of
 from .strength import law_of_table, ratio_of, with_strength_ratios, without_history
 from .supports import supports_of, warn_of_rigid_core
-from .undrained_doubts import soft_water_doubt
 
 
 @dataclass
@@ -291,20 +290,19 @@ def site_of(
         with_history = part_of(given, (*law_keys(), OVERCONSOLIDATION))
         say(idle_doubt(with_history, where))
         say(left_out_doubt(with_history, where))
-        say(creep_doubt(parameters, where))
         one = next(iter(own.values()))
-        say(secant_doubt(one, where))
-        say(soft_water_doubt(one, where))
+        for doubt in DOUBTS:
+            say(doubt(one, where))
         say("" if soil in k0 else k0_doubt(one, ratios.get(soil, 1.0), where))
     others = {
         name: law_of_table(located(part_of(given, law_keys()), path.parent), None, f"{path}: laws.{name}")
         for name, given in table.get("laws", {}).items()
     }
     for name, given in table.get("laws", {}).items():
-        for doubt in (unit_doubt, idle_doubt, left_out_doubt, creep_doubt):
-            say(doubt(given, f"{path}: laws.{name}"))
-        say(secant_doubt(others[name], f"{path}: laws.{name}"))
-        say(soft_water_doubt(others[name], f"{path}: laws.{name}"))
+        for of_table in (unit_doubt, idle_doubt, left_out_doubt):
+            say(of_table(given, f"{path}: laws.{name}"))
+        for doubt in DOUBTS:
+            say(doubt(others[name], f"{path}: laws.{name}"))
     members = {name: member_of(given, f"{path}: members.{name}") for name, given in table.get("members", {}).items()}
     _require_columns(members, path)
     _require_dimension(members, domain.topology.dim, path)

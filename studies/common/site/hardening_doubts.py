@@ -1,4 +1,4 @@
-"""Warnings of what parameters of Hardening Soil probably do not mean: a secant modulus that compression takes away, and K0 without history."""
+"""Warnings of what parameters of Hardening Soil probably do not mean: a secant modulus that compression takes away, strains in percent, K0 without history."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from fenics_bridge.fem.overconsolidation import hardening_soil_in, normal_k0
 
 SOFTEST = 2 / 3
 """Secant modulus at half of the strength over the one that is given, below which it is probably another one than was meant"""
+
+LARGEST_THRESHOLD = 2e-3
+"""Threshold strain above which it is probably in percent: plastic clay has up to 5e-4, peat some 1e-3"""
 
 INCREMENTS = 20
 """Increments of a triaxial test, which give its secant modulus to 1 %"""
@@ -53,6 +56,22 @@ def secant_doubt(law: Any, where: str) -> str:
                 f"{soil.oedometer_modulus:.3g} Pa. Raise secant_modulus where it is that of such a test (docs/howto/soils.md)"
             )
     return ""
+
+
+def threshold_doubt(law: Any, where: str) -> str:
+    """A warning of a threshold of small strains that is probably in percent; empty for others, and for other laws.
+
+    Args:
+        law: any law.
+        where: its parameters stand, for the message.
+    """
+    soil = hardening_soil_in(law)
+    if soil is None or soil.small_strain_modulus == 0 or soil.threshold_strain <= LARGEST_THRESHOLD:
+        return ""
+    return (
+        f"{where}: threshold_strain is {soil.threshold_strain:g}, a fraction: {soil.threshold_strain:g} % are {soil.threshold_strain / 100:g}; sand "
+        "has 1e-4 to 2e-4, plastic clay up to 5e-4"
+    )
 
 
 def k0_doubt(law: Any, overconsolidation: float, where: str) -> str:

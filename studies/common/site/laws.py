@@ -244,13 +244,11 @@ def is_profile(value: dict) -> bool:
 
 
 MODULI = ("young", "secant_modulus", "oedometer_modulus", "unloading_modulus", "small_strain_modulus")
-STRESSES = (HISTORY, "reference_pressure")
+STRESSES = ("preconsolidation", HISTORY, "reference_pressure")
 LEAST = dict.fromkeys(MODULI, 1e5) | dict.fromkeys(STRENGTHS, 50.0) | dict.fromkeys(STRESSES, 1e3)
 """Parameters [Pa] below which a soil of a site is probably given in kPa or MPa"""
 
 
-MOST_CREEP = 0.1
-"""Creep over the compression slope, C_alpha / C_c (Mesri and Godlewski 1977: 0.02 to 0.1), above which it is probably a mistake"""
 
 
 def unit_doubt(parameters: Mapping[str, Any], where: str, heights: Collection[float] = ()) -> str:
@@ -274,23 +272,6 @@ def unit_doubt(parameters: Mapping[str, Any], where: str, heights: Collection[fl
 def numbers_of(table: Mapping[str, Any], *keys: str) -> dict[str, Any]:
     """The numbers of a table with some keys."""
     return {key: table[key] for key in keys if is_number(table.get(key))}
-
-
-def creep_doubt(parameters: Mapping[str, Any], where: str) -> str:
-    """A warning of soft clay that creeps faster than any soil; empty for others.
-
-    Args:
-        parameters: of a law; where: they stand in the file.
-    """
-    creep, compression = parameters.get("creep"), parameters.get("compression_slope")
-    if _kind_of(parameters) != "cam-clay" or not (
-        is_number(creep) and is_number(compression) and creep > MOST_CREEP * compression > 0
-    ):
-        return ""
-    return (
-        f"{where}: creep is {creep:g}, {creep / compression:.2g} of compression_slope, expected {MOST_CREEP:g} of it at most, as of peat: it is "
-        "C_alpha / 2.303, and C_alpha / C_c of soil is 0.01 to 0.1 (docs/howto/soils.md)"
-    )
 
 
 def is_number(value: Any) -> bool:

@@ -9,7 +9,7 @@ import study_main
 from common.consolidation.site import read_consolidation_site
 from common.site.file import read_site
 from common.site.hardening_doubts import k0_doubt, secant_at_half, secant_doubt
-from common.site.laws import creep_doubt, idle_doubt, law_at, left_out_doubt
+from common.site.laws import idle_doubt, law_at, left_out_doubt
 from common.slope.site import read_slope_site
 from common.stages.runs import carry_out
 from hardening_soil_cases import hyperbola, preloaded, strength
@@ -283,8 +283,6 @@ def test_creep_of_cam_clay_that_no_soil_has_is_doubtful_and_messages_have_the_ke
         "critical_slope": 1.0,
         "void_ratio": 1.5,
     }
-    assert creep_doubt(clay | {"creep": 0.01}, "soils.clay") == creep_doubt(clay | {"creep": 0.025}, "soils.clay") == ""
-    assert "soils.clay: creep is 0.1, 0.4 of compression_slope" in creep_doubt(clay | {"creep": 0.1}, "soils.clay")
     with pytest.raises(
         mpm.InputError, match="compression_slope = 0.25, .* above swelling_slope .*; swelling_slope is 0.3"
     ):
