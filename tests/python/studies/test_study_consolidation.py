@@ -480,6 +480,27 @@ def test_soft_clay_creeps_on_when_its_water_is_out(tmp_path):
     assert abs(slope[0.0]) < 1e-5
 
 
+def test_soft_clay_settles_without_any_load(tmp_path):
+    """Where its overconsolidation ratio is 1, from 1000 to 30000 days by creep / v ln(30) times the height. Such ground is not said to be at rest."""
+    from common.consolidation.site import read_consolidation_site
+
+    from fenics_bridge import water
+
+    path = tmp_path / "site.toml"
+    path.write_text(
+        f'extends = "{STUDIES.parent}/meshes/soft_clay.toml"\ncell_size = 1.0\n[soils.clay]\nconductivity = 1e-6\noverconsolidation = 1.0\nk0 = 0.6\n'
+        "[pressures]\ntop = 0.0\n"
+    )
+    site = read_consolidation_site(path, MPI.COMM_SELF)
+    assert site.changes_until(86400.0)
+    model, found = site.at_rest(water.Element.TAYLOR_HOOD), []
+    for days in (1e3, 3e4):
+        assert model.run(86400.0 * days, 86400.0, 1.2)[-1].converged
+        found.append(-model.displacement.x.array.min())
+    height, volume = 5.0, 2.6 * np.exp(-np.mean(found) / 5.0)
+    assert found[1] - found[0] == pytest.approx(0.01 / volume * np.log(30) * height, rel=0.02)
+
+
 @pytest.mark.parametrize("width", [0.5, 20.0])
 def test_settlements_of_more_than_a_tenth_of_the_height_are_warned_of_and_are_no_collapse(tmp_path, width):
     from common.consolidation.site import read_consolidation_site
