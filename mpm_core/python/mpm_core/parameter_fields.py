@@ -80,6 +80,22 @@ def parameter_values(
     return floats(name, given, (len(position),))
 
 
+def check_differences(law: Any, state: NDArray[np.float64]) -> None:
+    """Require that the parameters of points are in their ranges, and no stiffer than the law's numbers.
+
+    Args:
+        law: any law; one without parameters that vary fits to all states.
+        state: state variables of points of the law, shape (n, number of states).
+
+    Raises:
+        InputError: a point's parameters are not possible.
+    """
+    part = _core_part(law)
+    if isinstance(part, Heterogeneous):
+        first = law.state_names.index(f"{part.varying[0]}_difference")
+        part.check_points(np.ascontiguousarray(state[:, first : first + len(part.varying)]))
+
+
 def differences_of(
     name: str, values: NDArray[np.float64], laws: Sequence[Any], material: NDArray[np.int32], state: NDArray[np.float64]
 ) -> NDArray[np.float64]:
@@ -107,11 +123,9 @@ def differences_of(
         if isinstance(part, SofteningMohrCoulomb):
             new[rows, law.state_names.index(DEVIATION)] = _deviations(name, values[rows], nominal)
             continue
-        first = law.state_names.index(f"{name}_difference")
-        new[rows, first] = values[rows] - nominal
-        first -= part.varying.index(name)
+        new[rows, law.state_names.index(f"{name}_difference")] = values[rows] - nominal
         try:
-            part.check_points(np.ascontiguousarray(new[rows, first : first + len(part.varying)]))
+            check_differences(law, new[rows])
         except InputError as error:  # the value may be one of another parameter, which does not fit to those given
             raise InputError(str(error) if name in str(error) else f"with the values of {name}, {error}") from None
     return new

@@ -12,7 +12,7 @@ from ._core import InputError
 from .checks import real_numbers
 from .collective import collectively
 from .mesh import Mesh, floats
-from .parameter_fields import Field, differences_of, has_varying, parameter_values, values_from
+from .parameter_fields import Field, check_differences, differences_of, has_varying, parameter_values, values_from
 from .particles import Particles
 
 
@@ -74,13 +74,19 @@ class ParticleValues:
         return values
 
     def set_state(self, name: str, values: ArrayLike) -> None:
-        """Overwrite a state variable by its name, in the particles whose law has it; shape (n,). Not collective."""
+        """Overwrite a state variable by its name, in the particles whose law has it; shape (n,). Not collective.
+
+        Raises:
+            InputError: another shape, or values of a parameter that varies by which a particle would have no law.
+        """
         state, material = self.particles.state.copy(), self.particles.material
         new = real_numbers("values", values)
         if new.shape != material.shape:
             raise InputError(f"values has shape {new.shape}, expected {material.shape}, one for each particle")
         for number, column in self._state_columns(name):
             state[material == number, column] = new[material == number]
+            if name.endswith("_difference"):
+                check_differences(self.laws[number], state[material == number])
         self.particles.set("state", state)
 
     def parameter(self, name: str) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from core_cases import box, by_id, rollers, run
+from hardening_soil_cases import sand
 from law_cases import random_points
 from mpi4py import MPI
 
@@ -303,3 +304,17 @@ def test_soil_with_a_random_field_moves_by_its_own_strengths():
     yielded = by_id(model, "plastic_strain") > 0
     assert (radius <= strength * (1 + 1e-9)).all() and yielded.mean() > 0.2
     assert np.abs(radius / strength - 1)[yielded].min() < 1e-9
+
+
+def test_states_that_no_point_of_the_law_can_have_are_refused():
+    """The law has no small-strain stiffness, and so no states for the memory of it."""
+    law = mpm.Heterogeneous(sand(), ["small_strain_modulus"])
+    model = mpm.Model(box([2, 2], [1.0, 1.0]), law)
+    model.seed(density=2000.0, per_cell=3)
+    for modulus, message in (
+        (1e6, "small_strain_modulus = 1e[+]06, but it must be 0 for none, or above"),
+        (112e6, "a point has the modulus .* above that of the law"),
+    ):
+        with pytest.raises(bridge.InputError, match=message):
+            model.set_state("small_strain_modulus_difference", np.full(len(model.particles), modulus))
+    assert (model.state("small_strain_modulus_difference") == 0).all()
