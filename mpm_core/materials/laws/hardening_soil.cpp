@@ -188,6 +188,9 @@ Start<N> start_of(const Soil& soil, const PointBatch<D>& points, Index i, Deviat
 {
   const auto [stress, strain] = tensors_of<D, N>(points, i);
   deviators = {deviator<D, N>(stress), deviator<D, N>(strain)};
+  const Stiffening<N> small = stiffening_of<D, N>(soil.small, points, i, deviators.strain);
+  for (N& component : deviators.strain)
+    component = small.strain * component;
   const auto [q, direction] = shape_of<D, N>(soil, deviators.stress);
   const N pressure = soil.attraction - mean<D, N>(stress);
   const N smallest = larger<N>(pressure - direction.smallest * q, N{} + soil.least);
@@ -208,10 +211,10 @@ Start<N> start_of(const Soil& soil, const PointBatch<D>& points, Index i, Deviat
           cap,
           growth,
           cap_compliance(soil, cap),
-          -3 * mean<D, N>(strain),
+          -3 * mean<D, N>(strain) * small.strain,
           square_along<D, N>(deviators.stress, deviators.strain),
           cube_along<D, N>(deviators.stress, deviators.strain),
-          stiffening_of<D, N>(soil.small, points, i, deviators.strain)};
+          small};
 }
 
 template <class N>
@@ -227,12 +230,38 @@ Mask<N> is_sound(const End<N>& end)
   return end.pressure + end.trial_q < most_stress;
 }
 
-/// @param small  derivatives of the small-strain stiffness
+/// The deviator of the strain increment of a point, or of a few
+template <int D, class N>
+std::array<N, n_stress<D>> deviatoric_strain(const PointBatch<D>& points, Index i)
+{
+  return deviator<D, N>(tensors_of<D, N>(points, i).second);
+}
+
+/// Changes a tangent by the strain increment that counts into one by that of the point, on which the small-strain
+/// stiffness depends as well.
+/// @param by_stiffness, by_softening  derivatives of the stress
 template <int D>
-void write_tangent(const Soil& soil, const Start<double>& start, const Solution<double>& solution,
-                   const Deviators<D, double>& deviators, const StiffeningSlopes<D>& small, double* tangent)
+void add_small_strain(const Soil& soil, const PointBatch<D>& points, Index i, double scale,
+                      const SymTensor<D>& by_stiffness, const SymTensor<D>& by_softening, double* tangent)
 {
   constexpr std::size_t n = n_stress<D>;
+  const StiffeningSlopes<D> slopes =
+      stiffening_slopes<D>(soil.small, points, i, deviatoric_strain<D, double>(points, i));
+  for (std::size_t row = 0; row < n; ++row)
+  {
+    double by_scale = 0;
+    for (std::size_t k = 0; k < n; ++k)
+      by_scale += tangent[row * n + k] * points.strain_increment[k][i];
+    for (std::size_t k = 0; k < n; ++k)
+      tangent[row * n + k] = scale * tangent[row * n + k] + by_scale * slopes.strain[k] +
+                             by_stiffness[row] * slopes.stiffness[k] + by_softening[row] * slopes.softening[k];
+  }
+}
+
+template <int D>
+void write_tangent(const Soil& soil, const Start<double>& start, const Solution<double>& solution,
+                   const Deviators<D, double>& deviators, const PointBatch<D>& points, Index i, double* tangent)
+{
   using T = Dual<7>;
   const auto change = [](std::size_t number) { return variable<7>(0.0, number); };
   const auto& [log_stress, mobilised] = solution.at;
@@ -260,11 +289,9 @@ void write_tangent(const Soil& soil, const Start<double>& start, const Solution<
                         lode_cosine_slope<D>(trial.deviator, trial.q, cosine), tangent);
   if (!soil.small.exists())
     return;
-  const SymTensor<D> by_stiffness = stress_slope<D>(trial, deviators.strain, ratio.value, slopes(5));
-  const SymTensor<D> by_softening = stress_slope<D>(trial, deviators.strain, ratio.value, slopes(6));
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = 0; j < n; ++j)
-      tangent[i * n + j] += by_stiffness[i] * small.stiffness[j] + by_softening[i] * small.softening[j];
+  add_small_strain<D>(soil, points, i, start.small.strain,
+                      stress_slope<D>(trial, deviators.strain, ratio.value, slopes(5)),
+                      stress_slope<D>(trial, deviators.strain, ratio.value, slopes(6)), tangent);
 }
 
 template <int D, class N>
@@ -276,7 +303,8 @@ void write(const Soil& soil, const Start<N>& start, const End<N>& end, const Dev
   add_to_state<D, N>(points, i, 0, end.plastic);
   store(start.shear + end.shear - soil.shear, points.state[1] + i);
   store(start.growth + end.cap_growth, points.state[2] + i);
-  drag<D, N>(soil.small, points, i, deviators.strain);
+  if (soil.small.exists())
+    drag<D, N>(soil.small, points, i, deviatoric_strain<D, N>(points, i));
 }
 
 template <class N>
@@ -294,8 +322,7 @@ Outcome update_point(const Soil& soil, const PointBatch<D>& points, Index i, dou
   if (!solution || !is_sound(solution->end))
     return Outcome::failed;
   if (tangent) // before the states change
-    write_tangent<D>(soil, start, *solution, deviators, stiffening_slopes<D>(soil.small, points, i, deviators.strain),
-                     tangent);
+    write_tangent<D>(soil, start, *solution, deviators, points, i, tangent);
   write<D, double>(soil, start, solution->end, deviators, points, i);
   return is_plastic(solution->end) || solution->is_loose ? Outcome::plastic : Outcome::elastic;
 }

@@ -122,15 +122,15 @@ N cap_compliance(const Soil& soil, const N& cap)
 template <class N>
 struct Start
 {
-  N pressure;                            ///< p + a
-  N stress, softness;                    ///< s3 + a, at least the least one, and t^-m of it
-  N mobilised;                           ///< (s1 - s3) / q_f, at most 1
-  N shear, cap, growth;                  ///< gamma, p_p, and ln of it over that of the law's start
-  N compliance;                          ///< of the cap
-  N volumetric;                          ///< volumetric strain increment
-  std::array<N, 3> square;               ///< q^2 of the trial by 2 G
-  std::array<N, 4> cube;                 ///< q^3 cos(3 theta) of the trial by 2 G
-  Stiffening<N> small{N{} + 1, N{} + 1}; ///< small-strain stiffness over the increment
+  N pressure;                                     ///< p + a
+  N stress, softness;                             ///< s3 + a, at least the least one, and t^-m of it
+  N mobilised;                                    ///< (s1 - s3) / q_f, at most 1
+  N shear, cap, growth;                           ///< gamma, p_p, and ln of it over that of the law's start
+  N compliance;                                   ///< of the cap
+  N volumetric;                                   ///< volumetric strain increment
+  std::array<N, 3> square;                        ///< q^2 of the trial by 2 G
+  std::array<N, 4> cube;                          ///< q^3 cos(3 theta) of the trial by 2 G
+  Stiffening<N> small{N{} + 1, N{} + 1, N{} + 1}; ///< small-strain stiffness over the increment
 };
 
 /// What the end is worked out from beside the start; each is differentiated by for the tangent.

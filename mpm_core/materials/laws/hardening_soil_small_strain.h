@@ -12,8 +12,8 @@
 /// until its tangent modulus is that of unloading.
 ///
 /// Source: Cudny, Truty (2020), Acta Geotechnica 15, 2031-2051, after Simpson (1992), Geotechnique 42, 541-576; the
-/// curve: Santos, Correia (2001), Proc. 15th ICSMGE, 267-270. Distances are dragged along straight increments, and
-/// H_i (`softening`) is its mean over an increment.
+/// curve: Santos, Correia (2001), Proc. 15th ICSMGE, 267-270. Distances are dragged along straight increments, over
+/// which moduli and 1 / H_i are integrated.
 
 #include "materials/laws/batch.h"
 #include "materials/tools/deviator.h"
@@ -125,7 +125,8 @@ N resting_part(const Dragged<D, N>& one, const Distance<D, N>& strain, const N& 
 template <class N>
 struct Stiffening
 {
-  N stiffness; ///< secant modulus over that of unloading
+  N stiffness; ///< mean of the modulus while plastic strain develops, over that of unloading
+  N strain;    ///< by how much the strain increment counts for more than in the increment with that modulus throughout
   N softening; ///< plastic strain over that without small-strain stiffness, 1 / H_i
 };
 
@@ -157,43 +158,53 @@ Largest<N> largest_of(const PointBatch<D>& points, Index i, const Dragged<D, N>&
   return {before, larger<N>(before, size_of<D, N>(last.moved))};
 }
 
-/// Change of the largest distance below which the mean of 1 / H_i is that of its middle
+/// Change of the largest distance below which 1 / H_i is that of the middle all the time
 inline double small_change(const SmallStrain& small) { return 1e-6 * small.end(); }
 
+/// Integral of 1 / H_i over the first part of an increment, of which the distance grows evenly
+/// @param part  from 0 to 1
 template <class N>
-N mean_softening(const SmallStrain& small, const Largest<N>& largest)
+N softening_until(const SmallStrain& small, const Largest<N>& largest, const N& part)
 {
   const Mask<N> is_small = largest.change() < small_change(small);
-  const N middle = softening_at<N>(small, 0.5 * (largest.before + largest.after)).first;
-  const N sum = softening_at<N>(small, largest.after).second - softening_at<N>(small, largest.before).second;
+  const N middle = part * softening_at<N>(small, 0.5 * (largest.before + largest.after)).first;
+  const N sum = softening_at<N>(small, largest.before + part * largest.change()).second -
+                softening_at<N>(small, largest.before).second;
   return chosen<N>(is_small, middle, sum / largest.change());
 }
 
+/// The increment goes along a straight line, on which a brick rests before its string is taut. With the modulus s and
+/// the plastic strains of the law without bricks times h = 1 / H_i, the stress grows by the integral of s (de - h dP),
+/// so that over an increment it is mean(s) e - mean(s h) / mean(h) e_p with its plastic strain e_p.
 template <int D, class N>
 Stiffening<N> stiffening_of(const SmallStrain& small, const PointBatch<D>& points, Index i,
                             const Distance<D, N>& strain)
 {
+  const N one = N{} + 1;
   if (!small.exists())
-    return {N{} + 1, N{} + 1};
+    return {one, one, one};
   const N square = product<D, N>(strain, strain);
-  N stiffness = N{} + 1;
-  Largest<N> largest{};
+  const Largest<N> largest = largest_of<D, N>(points, i, dragged<D, N>(small, points, i, strain, n_bricks - 1));
+  const N softening = softening_until(small, largest, one);
+  N mean = one, plastic = softening;
   for (std::size_t brick = 0; brick < n_bricks; ++brick)
   {
-    const Dragged<D, N> one = dragged<D, N>(small, points, i, strain, brick);
-    const N resting = resting_part<D, N>(one, strain, square);
-    stiffness = stiffness + small.stiffness[brick] * chosen<N>((one.share < 1) & (square > 0), resting, N{} + 1);
-    if (brick + 1 == n_bricks)
-      largest = largest_of<D, N>(points, i, one);
+    const Dragged<D, N> each_one = dragged<D, N>(small, points, i, strain, brick);
+    const Mask<N> is_dragged = (each_one.share < 1) & (square > 0);
+    const N part = chosen<N>(is_dragged, resting_part<D, N>(each_one, strain, square), one);
+    mean = mean + small.stiffness[brick] * part;
+    plastic =
+        plastic + small.stiffness[brick] * chosen<N>(is_dragged, softening_until(small, largest, part), softening);
   }
-  return {stiffness, mean_softening(small, largest)};
+  const N stiffness = plastic / softening;
+  return {stiffness, mean / stiffness, softening};
 }
 
 /// Derivatives of a stiffening by the strain increment, of engineering shear
 template <int D>
 struct StiffeningSlopes
 {
-  SymTensor<D> stiffness{}, softening{};
+  SymTensor<D> stiffness{}, strain{}, softening{};
 };
 
 template <int D>
@@ -204,28 +215,48 @@ StiffeningSlopes<D> stiffening_slopes(const SmallStrain& small, const PointBatch
   const double square = product<D>(strain, strain);
   if (!small.exists() || !(square > 0))
     return slopes;
+  const Dragged<D, double> last = dragged<D, double>(small, points, i, strain, n_bricks - 1);
+  const Largest<double> largest = largest_of<D, double>(points, i, last);
+  const bool grows = largest.change() >= small_change(small);
+  const double softening = softening_until(small, largest, 1.0);
+  SymTensor<D> by_mean{}, by_plastic{}, by_largest{};
+  for (std::size_t k = 0; k < n_stress<D> && grows; ++k)
+    by_largest[k] = 1.5 * last.moved[k] / largest.after;
+  // Derivative of the integral over the first part by the largest distance at the end, at a fixed part
+  const auto slope_until = [&](double part)
+  {
+    const double here = softening_at(small, largest.before + part * largest.change()).first;
+    return grows ? (part * here - softening_until(small, largest, part)) / largest.change() : 0.0;
+  };
+  double mean = 1, plastic = softening, plastic_by_largest = slope_until(1.0);
   for (std::size_t brick = 0; brick < n_bricks; ++brick)
   {
     const Dragged<D, double> one = dragged<D, double>(small, points, i, strain, brick);
-    const double along = product<D>(one.moved, strain), size = product<D>(one.moved, one.moved);
-    const double resting = resting_part<D, double>(one, strain, square);
-    if (one.share < 1 && resting > 0)
-      for (std::size_t k = 0; k < n_stress<D>; ++k)
-      {
-        // of the rest of the distance, share * moved - before, along the strain
-        const double turned = one.share * (strain[k] - along / size * one.moved[k]);
-        const double rest = one.share * one.moved[k] - one.before[k];
-        slopes.stiffness[k] += small.stiffness[brick] * (turned + rest - 2 * resting * strain[k]) / square;
-      }
-    const Largest<double> largest = largest_of<D, double>(points, i, one);
-    if (brick + 1 < n_bricks || !(largest.change() > 0))
+    const double part = one.share < 1 ? resting_part<D, double>(one, strain, square) : 1.0;
+    mean += small.stiffness[brick] * part;
+    plastic += small.stiffness[brick] * softening_until(small, largest, part);
+    plastic_by_largest += small.stiffness[brick] * slope_until(part);
+    if (!(one.share < 1 && part > 0))
       continue;
-    const double mean = mean_softening(small, largest);
-    const double by_largest = largest.change() < small_change(small)
-                                  ? 0.0
-                                  : (softening_at(small, largest.after).first - mean) / largest.change();
+    const double along = product<D>(one.moved, strain), size = product<D>(one.moved, one.moved);
+    const double here = grows ? softening_at(small, largest.before + part * largest.change()).first : softening;
     for (std::size_t k = 0; k < n_stress<D>; ++k)
-      slopes.softening[k] = by_largest * 1.5 * one.moved[k] / largest.after;
+    {
+      // of the rest of the distance, share * moved - before, along the strain
+      const double turned = one.share * (strain[k] - along / size * one.moved[k]);
+      const double rest = one.share * one.moved[k] - one.before[k];
+      const double by_part = (turned + rest - 2 * part * strain[k]) / square;
+      by_mean[k] += small.stiffness[brick] * by_part;
+      by_plastic[k] += small.stiffness[brick] * here * by_part;
+    }
+  }
+  const double stiffness = plastic / softening;
+  for (std::size_t k = 0; k < n_stress<D>; ++k)
+  {
+    slopes.softening[k] = slope_until(1.0) * by_largest[k];
+    slopes.stiffness[k] =
+        (by_plastic[k] + plastic_by_largest * by_largest[k] - stiffness * slopes.softening[k]) / softening;
+    slopes.strain[k] = (by_mean[k] - mean / stiffness * slopes.stiffness[k]) / stiffness;
   }
   return slopes;
 }
@@ -234,8 +265,6 @@ StiffeningSlopes<D> stiffening_slopes(const SmallStrain& small, const PointBatch
 template <int D, class N>
 void drag(const SmallStrain& small, const PointBatch<D>& points, Index i, const Distance<D, N>& strain)
 {
-  if (!small.exists())
-    return;
   for (std::size_t brick = 0; brick < n_bricks; ++brick)
   {
     const Dragged<D, N> one = dragged<D, N>(small, points, i, strain, brick);

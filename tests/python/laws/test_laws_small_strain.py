@@ -171,3 +171,15 @@ def test_states_have_names():
     assert names[4] == "brick_1_xx"
     assert names[-1] == "brick_10_xz"
     assert len(names) == len(set(names)) == 54
+
+
+@pytest.mark.parametrize("modulus", [150e6, 300e6])
+def test_first_compression_in_ten_increments_is_that_in_a_thousand(modulus):
+    """Its stiffness falls while plastic strains begin, so that their means over an increment must not be multiplied."""
+    k0, ends = 1 - np.sin(np.radians(35.0)), []
+    for steps in (1000, 10):
+        test = mpm.ElementTest(small_strain_sand(small_strain_modulus=modulus), [-100e3 * k0, -100e3, -100e3 * k0, 0.0])
+        for _ in range(steps):
+            test.step([0.0, -1e-3 / steps, 0.0, 0.0])
+        ends.append(test.stress[1] + 100e3)
+    assert ends[1] == pytest.approx(ends[0], rel=5e-3)
