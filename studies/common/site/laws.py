@@ -249,8 +249,6 @@ LEAST = dict.fromkeys(MODULI, 1e5) | dict.fromkeys(STRENGTHS, 50.0) | dict.fromk
 """Parameters [Pa] below which a soil of a site is probably given in kPa or MPa"""
 
 
-
-
 def unit_doubt(parameters: Mapping[str, Any], where: str, heights: Collection[float] = ()) -> str:
     """A warning of stiffness, of soil or water, or strength in another unit than Pa; empty where there is no doubt, as for films that keep their volume.
 
