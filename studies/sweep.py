@@ -195,7 +195,7 @@ def refusal(run: Run, named: Sequence[str]) -> list[str]:
     missing = [name for name in named if run.results and name not in run.results]
     there = ", ".join(name for name in run.results if "." not in name)
     return [
-        f"{name} is no result of the study{did_you_mean(name, run.results)}, expected one of {there}"
+        f"{name} is no result of the study, expected one of {there}{did_you_mean(name, run.results)}"
         for name in missing
     ]
 
