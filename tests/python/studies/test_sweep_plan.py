@@ -233,7 +233,9 @@ def test_what_a_run_that_ended_early_has_found_is_in_no_statistics(tmp_path):
 def test_a_result_that_is_not_known_in_the_first_run_is_one_of_the_study():
     first = run(1, {}, front_m=3.0, angle=None)
     assert refusal(first, ["angle"]) == [] and math.isnan(first.result("angle"))
-    assert refusal(first, ["angel"])[0].startswith("angel is no result of the study; did you mean angle?")
+    assert refusal(first, ["angel"]) == [
+        "angel is no result of the study, expected one of front_m, angle; did you mean angle?"
+    ]
 
 
 def test_a_run_that_fails_in_its_work_does_not_speak_for_the_others(tmp_path):
