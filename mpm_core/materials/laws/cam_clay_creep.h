@@ -67,8 +67,8 @@ CreepEnd<T> creep_end(const Start<Number<T>>& a, const Number<T>& log_rate, cons
 /// Creep strains below this are none [-].
 inline constexpr double least_creep = 1e-18;
 
-/// ln z of an isotropic stress, which the others are near to: ln(z) / exponent + (v / kappa + v / (lambda - kappa)) z =
-/// c
+/// ln z of an isotropic stress, which the others are near to:
+///     ln(z) / exponent + (v / kappa + v / (lambda - kappa)) z = c
 template <class N>
 N isotropic_flow(const Start<N>& a, const Result<N>& trial, const N& log_rate)
 {
@@ -157,7 +157,8 @@ std::optional<CreepAt<N>> creep_solution(const Start<N>& a, const Result<N>& tri
 template <class N>
 Result<N> creep_result(const Start<N>& a, const CreepAt<N>& at)
 {
-  const N multiplier = exponential<N>(at.log_flow) / creep_end<N>(a, at.log_rate, at.x, at.log_flow).pressure;
+  const N pressure = a.pressure * growth_of<N>(a.elastic * (a.volumetric - at.x)).factor;
+  const N multiplier = exponential<N>(at.log_flow) / pressure;
   return result_of<N>(a, chosen<N>(at.creeps, at.x, N{}), chosen<N>(at.creeps, multiplier, N{}));
 }
 
