@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from mpm_core.laws import small_strain_columns
 from numpy.typing import NDArray
 
 from fenics_bridge.types import Law
-
-MEMORY = ("largest_small_strain", "brick_")
-"""What the names of the state variables of the memory begin with"""
 
 
 def without_memory(law: Law, state: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -24,7 +22,6 @@ def without_memory(law: Law, state: NDArray[np.float64]) -> NDArray[np.float64]:
     Returns:
         State variables, shape (n, n_state): those of the memory are zero, others as they were.
     """
-    columns = [number for number, name in enumerate(law.state_names) if name.startswith(MEMORY)]
     rested = state.copy()
-    rested[:, columns] = 0.0
+    rested[:, small_strain_columns(law)] = 0.0
     return rested

@@ -42,10 +42,10 @@ def refuse_beyond_equilibrium(model: Model, integration: Integration | None) -> 
 def find_equilibrium(model: Model, solver: Any, options: Any, tolerance: float, max_steps: int) -> ImplicitReport:
     """Quasi-static steps at the present time until the particles balance their loads.
 
-    The out-of-balance force is applied at once, or in parts where that fails or soil has a small-strain stiffness. The steps that apply it move the particles; the
-    steps that follow do not, because a particle could cross between two cells for ever, driven by the jump of the nodal forces
-    at each crossing. The forces of the ghost penalty, which are part of a step's equilibrium but not of the particles', decrease
-    from step to step. Supports with a prescribed velocity stand still.
+    The out-of-balance force is applied at once, or in parts where that fails or soil has a small-strain stiffness. The steps that
+    apply it move the particles; the steps that follow do not, because a particle could cross between two cells for ever, driven
+    by the jump of the nodal forces at each crossing. The forces of the ghost penalty, which are part of a step's equilibrium but
+    not of the particles', decrease from step to step. Supports with a prescribed velocity stand still.
     """
     with _standing_supports(model):
         return _found_equilibrium(model, solver, options, tolerance, max_steps)

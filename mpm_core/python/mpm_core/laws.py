@@ -1,5 +1,7 @@
 """Laws that are special cases of others, under their usual names."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -187,6 +189,15 @@ def hardening_soil_state(
         raise InputError(f"stress has shape {rows.shape}, expected (n, 4) or (n, 6)")
     shear, cap = hardened_to(law, rows, overconsolidation).T
     return {"shear_hardening": shear.copy(), "log_preconsolidation": cap.copy()}
+
+
+SMALL_STRAINS = ("largest_small_strain", "brick_")
+"""What the names of the state variables begin with in which HardeningSoil remembers small strains"""
+
+
+def small_strain_columns(law: Any) -> list[int]:
+    """The state variables of a law, by number, that remember small strains; none of laws without a small-strain stiffness."""
+    return [number for number, name in enumerate(law.state_names) if name.startswith(SMALL_STRAINS)]
 
 
 def _volume_beside(

@@ -9,6 +9,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from .laws import small_strain_columns
+
 MAX_CUTS = 10
 """A step is not made shorter than the longest one / 2^MAX_CUTS."""
 
@@ -24,8 +26,7 @@ def first_part(laws: Iterable[Any], usual: float) -> float:
         laws: of the soils.
         usual: part of other laws [-].
     """
-    has_bricks = any(name.startswith("brick_") for law in laws for name in law.state_names)
-    return min(usual, SMALL_PART) if has_bricks else usual
+    return min(usual, SMALL_PART) if any(map(small_strain_columns, laws)) else usual
 
 
 @dataclass
