@@ -97,7 +97,7 @@ class FemSite:
         fem = self.fem
         state, _, _ = self.state.after(stage)
         ratios = state.overconsolidation_of(stage, self._laws(state))
-        steps = fem.solve(self._begin(stage, state), **self._options)
+        steps = fem.solve(self._begin(stage, state, ratios), **self._options)
         self.number += 1
         if not fem.converged:
             raise StageError(self._failure(stage, steps), 1.0 - fem.load.held)
@@ -142,7 +142,8 @@ class FemSite:
         state, rest, load = self.state, stages[last:], None
         if rest[0].strength_ratio:
             state, _, _ = state.after(rest[0])
-            load, rest = self._begin(rest[0], state), rest[1:]
+            ratios = state.overconsolidation_of(rest[0], self._laws(state))
+            load, rest = self._begin(rest[0], state, ratios), rest[1:]
         for stage in rest:
             state, _, _ = state.after(stage)
         self.number = len(stages)
@@ -165,8 +166,11 @@ class FemSite:
         active = cells_there(self.fem.domain, self.fem.cell_tags, off) if off else None
         self.fem.require_members(members, active, where)
 
-    def _begin(self, stage: Stage, state: SiteState) -> Load:
-        """Make the changes of a stage, which leads to a state; returns the state's load, which does not act yet."""
+    def _begin(self, stage: Stage, state: SiteState, ratios: Mapping[int, float]) -> Load:
+        """Make the changes of a stage, which leads to a state; returns the state's load, which does not act yet.
+
+        ratios: overconsolidation ratios [-] of the stage, by tag.
+        """
         fem, laws, before = self.fem, self._laws(state), self.state.there
         k0, weak = state.k0_of(stage), state.strength_ratio_of(stage, laws)
         given, carried = (
@@ -177,8 +181,8 @@ class FemSite:
             fem.reset_displacement()
         if replaced := set(stage.remove).intersection(stage.install):
             fem.reconfigure(members={name: one for name, one in fem.members.items() if name not in replaced})
-        ratios = before_equilibrium(state.overconsolidation_of(stage, laws), laws)
-        load = self._enter(state, stage.stress if given is None else given, strength, ratios)
+        stress = stage.stress if given is None else given
+        load = self._enter(state, stress, strength, before_equilibrium(ratios, laws))
         if given is not None:
             rows = rows_of(fem, k0)
             warn_beyond_strength(fem.domain.comm, f"stage {stage.name!r}: ", given[rows], fem.points.stress[rows])

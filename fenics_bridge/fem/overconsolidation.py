@@ -98,8 +98,8 @@ def hardened(law: Law, stress: NDArray[np.float64], state: NDArray[np.float64], 
     level[:, :3] = normal_k0(soil) * np.minimum(effective[:, up], 0.0)[:, None]
     level[:, up] = np.minimum(effective[:, up], 0.0)
     if isinstance(soil, mpm.CamClay):
-        size = np.maximum(yield_size(soil, ratio * level), yield_size(soil, effective))
-        result[:, names.index("log_preconsolidation")] = np.log(size / (soil.preconsolidation + soil.attraction))
+        sizes = [mpm.log_preconsolidation(soil, under_pressure(soil, each)) for each in (ratio * level, effective)]
+        result[:, names.index("log_preconsolidation")] = np.maximum(*sizes)
         return result
     for found in (mpm.hardening_soil_state(soil, level, ratio), mpm.hardening_soil_state(soil, effective)):
         for name, values in found.items():
@@ -122,17 +122,11 @@ LEAST_PRESSURE = 1.0
 """Pressure [Pa], attraction included, that the yield surface of a point of CamClay has at least"""
 
 
-def yield_size(soil: mpm.CamClay, stress: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Preconsolidation pressures (n,) [Pa], attraction included, whose yield surfaces pass through stresses (n, S).
-
-    Args:
-        soil: the clay.
-        stress: effective stress [Pa], tension positive, shape (n, S).
-    """
-    mean = stress[:, :3].mean(axis=1)
-    squares = ((stress[:, :3] - mean[:, None]) ** 2).sum(axis=1) + 2 * (stress[:, 3:] ** 2).sum(axis=1)
-    pressure = np.maximum(soil.attraction - mean, LEAST_PRESSURE)
-    return pressure + 1.5 * squares / (soil.critical_slope**2 * pressure)
+def under_pressure(soil: mpm.CamClay, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Stresses (n, S) [Pa], tension positive, with at least `LEAST_PRESSURE`: without pressure no yield surface passes through them."""
+    mean, pressed = stress[:, :3].mean(axis=1), stress.copy()
+    pressed[:, :3] -= np.maximum(mean - (soil.attraction - LEAST_PRESSURE), 0.0)[:, None]
+    return pressed
 
 
 def effective_stress(law: Law, stress: NDArray[np.float64], state: NDArray[np.float64]) -> NDArray[np.float64]:
