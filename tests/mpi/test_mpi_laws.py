@@ -23,29 +23,16 @@ CLAY = mpm.CamClay(compression=0.2, swelling=0.05, critical_slope=1.0, poisson=0
                    preconsolidation=4e3, attraction=3e3)  # fmt: skip
 SAND = mpm.NorSand(critical_void_ratio=0.9, critical_compression=0.03, critical_slope=1.25, dilatancy=4.0, hardening=100.0,
                    rigidity=200.0, poisson=0.2, void_ratio=0.9, image_pressure=3e3, attraction=3e3)  # fmt: skip
+HARDENING = {"secant_modulus": 2e6, "oedometer_modulus": 2e6, "unloading_modulus": 6e6, "cohesion": 1e3, "friction_angle": 25.0,
+             "reference_pressure": 20e3}  # fmt: skip
 WATER = {"water_modulus": 4e6, "porosity": 0.4}
 LAWS = {
     "softening": SOFTENING,
     "Cam-Clay": CLAY,
     "NorSand": SAND,
     "SANISAND": sand(largest_pressure=5e3, attraction=3e3),
-    "Hardening Soil": mpm.HardeningSoil(
-        secant_modulus=2e6,
-        oedometer_modulus=2e6,
-        unloading_modulus=6e6,
-        cohesion=1e3,
-        friction_angle=25.0,
-        reference_pressure=20e3,
-    ),
-    "small-strain Hardening Soil": mpm.HardeningSoil(
-        secant_modulus=2e6,
-        oedometer_modulus=2e6,
-        unloading_modulus=6e6,
-        cohesion=1e3,
-        friction_angle=25.0,
-        reference_pressure=20e3,
-        small_strain_modulus=10e6,
-    ),
+    "Hardening Soil": mpm.HardeningSoil(**HARDENING),
+    "small-strain Hardening Soil": mpm.HardeningSoil(**HARDENING, small_strain_modulus=10e6),
     "Python": mpm.PythonLaw(VonMises(strength=3e3)),
     "undrained Hencky": mpm.Undrained(mpm.Hencky(SOFTENING), **WATER),
     "viscoplastic": mpm.ViscoplasticMohrCoulomb(**ELASTIC, cohesion=1e3, friction_angle=25.0, viscosity=1e4),

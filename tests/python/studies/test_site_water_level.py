@@ -17,6 +17,14 @@ def test_the_top_of_triangles():
     assert np.isneginf(found[3]) and found[4] == pytest.approx(1.5)
 
 
+def read_dike(folder, level):
+    """The site of a dike with a water level."""
+    path = folder / "site.toml"
+    stage = f'[[stages]]\nname = "in situ"\nfill = ["bank", "ground"]\nwater_level = {level}\n'
+    path.write_text(f'extends = "{ROOT}/meshes/dike.toml"\n{stage}')
+    return read_site(path, MPI.COMM_WORLD)
+
+
 @pytest.mark.parametrize("level, slopes", [
     ("[[0, 6], [10, 6], [26, 0], [40, 0]]", False),  # along the crest's left part and the face of 1:2 of the bank
     ("[[0, 6], [10, 9], [26, 2], [36, 2]]", True),  # above the face
@@ -26,10 +34,7 @@ def test_the_top_of_triangles():
 ])  # fmt: skip
 def test_a_level_that_slopes_where_water_stands_is_doubted(tmp_path, level, slopes, recwarn):
     """The dike is 8 m high and 1:2, its crest ends at x = 10 m and its toe is at x = 26 m."""
-    path = tmp_path / "site.toml"
-    stage = f'[[stages]]\nname = "in situ"\nfill = ["bank", "ground"]\nwater_level = {level}\n'
-    path.write_text(f'extends = "{ROOT}/meshes/dike.toml"\n{stage}')
-    read_site(path, MPI.COMM_WORLD)
+    read_dike(tmp_path, level)
     said = [str(one.message) for one in recwarn if "water_level slopes by 1:" in str(one.message)]
     assert len(said) == slopes
     assert not said or "stages[0]: water_level" in said[0] and "above the ground" in said[0]
@@ -40,10 +45,7 @@ def test_a_level_that_slopes_where_water_stands_is_doubted(tmp_path, level, slop
 )
 def test_a_level_below_the_base_is_doubted(tmp_path, level, dry, recwarn):
     """The base of the dike's ground is at -4 m: a depth of 5 m below the crest is at 3 m."""
-    path = tmp_path / "site.toml"
-    stage = f'[[stages]]\nname = "in situ"\nfill = ["bank", "ground"]\nwater_level = {level}\n'
-    path.write_text(f'extends = "{ROOT}/meshes/dike.toml"\n{stage}')
-    read_site(path, MPI.COMM_WORLD)
+    read_dike(tmp_path, level)
     said = [str(one.message) for one in recwarn if "below the base of the mesh" in str(one.message)]
     assert len(said) == dry
     assert not said or "stages[0]: water_level is -" in said[0] and "base of the mesh at -4 m" in said[0]
