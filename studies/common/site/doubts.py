@@ -44,11 +44,17 @@ LOOSEST = 1e-5
 """Compressibility [1/Pa] above which it is probably in other units, or a modulus"""
 
 
+def ends_of_mesh(domain: Any) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the largest coordinates of a mesh, (3,) each [m]. Collective."""
+    x, comm = domain.geometry.x, domain.comm
+    ends = np.max(comm.allgather([-x.min(axis=0, initial=np.inf), x.max(axis=0, initial=-np.inf)]), axis=0)
+    return -ends[0], ends[1]
+
+
 def ends_of_height(domain: Any) -> tuple[float, float]:
     """Height of the lowest and of the highest point of a mesh [m]. Collective."""
-    height = domain.geometry.x[:, domain.geometry.dim - 1]
-    low, high = zip(*domain.comm.allgather((height.min(initial=np.inf), height.max(initial=-np.inf))))
-    return float(min(low)), float(max(high))
+    low, high = (float(end[domain.geometry.dim - 1]) for end in ends_of_mesh(domain))
+    return low, high
 
 
 def warn_of_depth(domain: Any, levels: Iterable[float], where: str) -> None:

@@ -16,6 +16,7 @@ from fenics_bridge.compat import facet_nodes
 from fenics_bridge.fem.supports import tagged_facets
 
 from ..checks import say
+from .doubts import ends_of_mesh
 
 LEAST_LEVEL = 0.05
 """Part of the area of a base, seen from above, below which it stands upright"""
@@ -92,7 +93,7 @@ def _warn_of_free_sides(path: Path, domain: Any, facet_tags: Any, held: Mapping[
         held: supports by boundary.
     """
     comm, x = domain.comm, domain.geometry.x
-    low, high = _ends(domain)
+    low, high = ends_of_mesh(domain)
     free = []
     for name in bridge.names_of(facet_tags):
         normal = None if name in held else bridge.flat_normal(domain, facet_tags, name)
@@ -110,19 +111,12 @@ def _warn_of_free_sides(path: Path, domain: Any, facet_tags: Any, held: Mapping[
             "in [supports], or give [supports] without it where it is a free surface")  # fmt: skip
 
 
-def _ends(domain: Any) -> tuple[np.ndarray, np.ndarray]:
-    """The least and the largest coordinates of a mesh, (3,) each [m]. Collective."""
-    x, comm = domain.geometry.x, domain.comm
-    ends = np.max(comm.allgather([-x.min(axis=0, initial=np.inf), x.max(axis=0, initial=-np.inf)]), axis=0)
-    return -ends[0], ends[1]
-
-
 def _warn_of_sides_without_name(path: Path, domain: Any, facet_tags: Any, axisymmetric: bool) -> None:
     """Warn where boundaries without a name, which no support holds, are at the lower end or at a side of a mesh; path: of the file. Collective.
 
     The axis of an axisymmetric mesh needs no support.
     """
-    dim, (low, high) = domain.geometry.dim, _ends(domain)
+    dim, (low, high) = domain.geometry.dim, ends_of_mesh(domain)
     nameless = np.setdiff1d(exterior_facet_indices(domain.topology), facet_tags.indices)
     corners = domain.geometry.x[facet_nodes(domain, nameless)]
     near = 1e-6 * (high - low).max()
