@@ -18,6 +18,7 @@ def reduced_strength(law: Laws, factor: float, unreduced: Collection[int | str] 
     - MohrCoulomb (and `tresca`): c / F and tan(phi) / F. The dilation angle stays where it can, and is limited to the new
       friction angle: associated flow stays associated.
     - HardeningSoil: as MohrCoulomb; stiffness and cap stay.
+    - HoekBrown: the shear strengths under all normal stresses; the dilation angle stays the same fraction of the friction angle.
     - SofteningMohrCoulomb: peak and residual strength alike.
     - DruckerPrager: strength and slope of the cone. Of one that matches a soil of Mohr and Coulomb this is more than c / F and
       tan(phi) / F: factors of safety are smaller than those of the soil, by a twentieth for 25 degrees and by a sixth for 38

@@ -10,6 +10,8 @@
 namespace mpm::python
 {
 void bind_laws(pybind11::module_& m);
+/// Laws of soil and rock that are not made of others
+void bind_soil_laws(pybind11::module_& m);
 /// Laws written in Python
 void bind_python_law(pybind11::module_& m);
 /// Meshes, and what ranks find of each other's

@@ -68,6 +68,8 @@ Law law_of(std::string_view name, bool yields)
     law.small_strain_modulus = name == "HardeningSoil" ? 0 : 50e6;
     return law;
   }
+  if (name == "HoekBrown")
+    return HoekBrown{soil.young, soil.poisson, yields ? 20e3 : 400e6, 20, 4};
   std::fprintf(stderr, "unknown law %s\n", name.data());
   std::exit(1);
 }

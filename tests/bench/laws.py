@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 
 LAWS = ["LinearElastic", "MohrCoulomb", "ViscoplasticMohrCoulomb", "SofteningMohrCoulomb", "DruckerPrager", "CamClay",
-        "NorSand", "Sanisand", "HardeningSoil", "small-strain HardeningSoil"]  # fmt: skip
+        "NorSand", "Sanisand", "HardeningSoil", "small-strain HardeningSoil", "HoekBrown"]  # fmt: skip
 KINDS = [(2, "elastic"), (2, "plastic"), (3, "elastic"), (3, "plastic")]
 
 

@@ -30,6 +30,7 @@ double fraction(const L& law)
 }
 
 double fraction(const DruckerPrager& law) { return law.dilation < law.friction ? law.dilation / law.friction : 1; }
+double fraction(const HoekBrown& law) { return law.dilation_ratio; }
 double fraction(const ViscoplasticMohrCoulomb& law) { return fraction(law.inviscid); }
 double fraction(const SofteningMohrCoulomb& law) { return fraction(law.peak); }
 

@@ -7,6 +7,7 @@
 #include "materials/laws/drucker_prager.h"
 #include "materials/laws/external_law.h"
 #include "materials/laws/hardening_soil.h"
+#include "materials/laws/hoek_brown.h"
 #include "materials/laws/linear_elastic.h"
 #include "materials/laws/mohr_coulomb.h"
 #include "materials/laws/nor_sand.h"
@@ -23,7 +24,7 @@ namespace mpm::materials
 /// One of the laws that stand for themselves, or one of `Wrapper`, laws that are made of another one
 template <class... Wrapper>
 using LawList = std::variant<LinearElastic, MohrCoulomb, ViscoplasticMohrCoulomb, SofteningMohrCoulomb, DruckerPrager,
-                             CamClay, NorSand, Sanisand, HardeningSoil, ExternalLaw, Umat, Wrapper...>;
+                             CamClay, NorSand, Sanisand, HardeningSoil, HoekBrown, ExternalLaw, Umat, Wrapper...>;
 
 /// Throws InputError, with name, value and range, when a parameter of a law is out of its range.
 template <class L>

@@ -248,8 +248,8 @@ void write_tangents(const Surface& m, const RegionMaps& maps, const Candidates<D
   constexpr std::size_t entries = n_stress<D> * n_stress<D>;
   for (std::size_t i = 0; i < candidates.size; ++i)
     if (candidates.returned.at(i).region != Region::elastic)
-      write_tangent<D>(m, maps, candidates.trial.at(i), candidates.returned.at(i),
-                       tangents + static_cast<std::size_t>(candidates.point[i]) * entries);
+      write_tangent<D>(m, maps.of[static_cast<std::size_t>(candidates.returned.at(i).region)], candidates.trial.at(i),
+                       candidates.returned.at(i), tangents + static_cast<std::size_t>(candidates.point[i]) * entries);
 }
 
 /// Returns the points of a block that yield, after its elastic step, and writes their tangents, if wanted.

@@ -92,28 +92,34 @@ void add_product(double factor, const SymTensor<D>& a, const SymTensor<D>& b, do
 }
 } // namespace
 
-RegionMaps region_maps(const Surface& m)
+Matrix3 region_map(const Surface& m, Region region)
 {
   Surface homogeneous = m; // without the constants each return is its own derivative
   homogeneous.cohesion_cos = homogeneous.strength = homogeneous.tension = 0;
   constexpr std::array<Principal, 3> units{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  Matrix3 map{};
+  for (std::size_t j = 0; j < 3; ++j)
+  {
+    const Principal column = on_region(homogeneous, region, units[j]);
+    map[0][j] = column.s1;
+    map[1][j] = column.s2;
+    map[2][j] = column.s3;
+  }
+  return map;
+}
+
+RegionMaps region_maps(const Surface& m)
+{
   RegionMaps maps{};
   for (std::size_t region = 0; region < n_regions; ++region)
-    for (std::size_t j = 0; j < 3; ++j)
-    {
-      const Principal column = on_region(homogeneous, static_cast<Region>(region), units[j]);
-      maps.of[region][0][j] = column.s1;
-      maps.of[region][1][j] = column.s2;
-      maps.of[region][2][j] = column.s3;
-    }
+    maps.of[region] = region_map(m, static_cast<Region>(region));
   return maps;
 }
 
 template <int D>
-void write_tangent(const Surface& m, const RegionMaps& maps, const Spectral<D>& trial, const Returned& returned,
+void write_tangent(const Surface& m, const Matrix3& map, const Spectral<D>& trial, const Returned& returned,
                    double* tangent)
 {
-  const Matrix3& map = maps.of[static_cast<std::size_t>(returned.region)];
   const std::array<double, 3> before{trial.stress.s1, trial.stress.s2, trial.stress.s3};
   const std::array<double, 3> after{returned.stress.s1, returned.stress.s2, returned.stress.s3};
   const Dyads<D> basis = dyads(trial.frame);
@@ -132,6 +138,6 @@ void write_tangent(const Surface& m, const RegionMaps& maps, const Spectral<D>& 
                    tangent);
 }
 
-template void write_tangent<2>(const Surface&, const RegionMaps&, const Spectral<2>&, const Returned&, double*);
-template void write_tangent<3>(const Surface&, const RegionMaps&, const Spectral<3>&, const Returned&, double*);
+template void write_tangent<2>(const Surface&, const Matrix3&, const Spectral<2>&, const Returned&, double*);
+template void write_tangent<3>(const Surface&, const Matrix3&, const Spectral<3>&, const Returned&, double*);
 } // namespace mpm::materials::mohr_coulomb

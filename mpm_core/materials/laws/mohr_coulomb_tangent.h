@@ -17,8 +17,12 @@ struct RegionMaps
 
 RegionMaps region_maps(const Surface& m);
 
+/// That of one region
+Matrix3 region_map(const Surface& m, Region region);
+
 /// Writes d stress / d strain (row-major, engineering shear) of a point that was returned from the trial stress given.
+/// @param map  derivative of the returned principal stresses by the trial ones
 template <int D>
-void write_tangent(const Surface& m, const RegionMaps& maps, const Spectral<D>& trial, const Returned& returned,
+void write_tangent(const Surface& m, const Matrix3& map, const Spectral<D>& trial, const Returned& returned,
                    double* tangent);
 } // namespace mpm::materials::mohr_coulomb

@@ -62,9 +62,9 @@ void write_softening_tangent(const SofteningPoint& point, const Frame<D>& frame,
 {
   const Surface m = point.surface_at(increment);
   const Returned returned = return_to_surface(m, point.trial);
-  const RegionMaps maps = region_maps(m);
-  write_tangent<D>(m, maps, {point.trial, frame}, returned, tangent);
-  add_softening<D>(point, m, maps.of[static_cast<std::size_t>(returned.region)], frame, returned.stress, increment,
+  const Matrix3 map = region_map(m, returned.region);
+  write_tangent<D>(m, map, {point.trial, frame}, returned, tangent);
+  add_softening<D>(point, m, map, frame, returned.stress, increment,
                    tangent);
 }
 

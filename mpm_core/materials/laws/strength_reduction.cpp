@@ -170,6 +170,13 @@ HardeningSoil reduced_strength(const HardeningSoil& law, double factor)
   return reduced;
 }
 
+HoekBrown reduced_strength(const HoekBrown& law, double factor)
+{
+  HoekBrown reduced = law;
+  reduced.strength_factor *= factor;
+  return reduced;
+}
+
 Sanisand reduced_strength(const Sanisand& law, double factor)
 {
   Sanisand reduced = law;

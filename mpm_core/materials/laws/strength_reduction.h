@@ -21,6 +21,8 @@ NorSand reduced_strength(const NorSand& law, double factor);
 Sanisand reduced_strength(const Sanisand& law, double factor);
 /// As `MohrCoulomb`; stiffness and cap stay.
 HardeningSoil reduced_strength(const HardeningSoil& law, double factor);
+/// Shear strengths under all normal stresses; associated flow stays associated.
+HoekBrown reduced_strength(const HoekBrown& law, double factor);
 
 /// Reduces the parameters that the law names.
 /// @throws InputError it names none

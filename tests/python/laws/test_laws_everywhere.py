@@ -29,6 +29,9 @@ SMALL_STRAIN = mpm.HardeningSoil(
     **{p.name: getattr(HARDENING, p.name) for p in mpm.HardeningSoil.parameters}
     | {"small_strain_modulus": 100e6, "threshold_strain": 1e-4}
 )
+ROCK = mpm.HoekBrown(
+    young=20e6, poisson=0.3, intact_strength=1e6, geological_strength_index=20.0, intact_constant=4.0, dilation_ratio=0.2
+)
 LAWS = {
     "elastic": mpm.LinearElastic(**ELASTIC),
     "Mohr-Coulomb": SOIL,
@@ -50,6 +53,8 @@ LAWS = {
     "small-strain Hardening Soil": SMALL_STRAIN,
     "undrained small-strain Hardening Soil": mpm.Undrained(SMALL_STRAIN, water_modulus=2e8, porosity=0.45),
     "Hencky small-strain Hardening Soil": mpm.Hencky(SMALL_STRAIN),
+    "Hoek-Brown": ROCK,
+    "Hencky Hoek-Brown": mpm.Hencky(ROCK),
     "Hencky": mpm.Hencky(SOIL),
     "viscoplastic": mpm.ViscoplasticMohrCoulomb(
         **ELASTIC, cohesion=10e3, friction_angle=25.0, dilation_angle=5.0, viscosity=1e-6

@@ -1,0 +1,189 @@
+#include "materials/laws/hoek_brown.h"
+
+#include "materials/laws/hoek_brown_return.h"
+#include "materials/tools/root.h"
+#include "materials/tools/separation.h"
+
+namespace mpm::materials
+{
+namespace hoek_brown
+{
+namespace
+{
+/// Steps of Newton's method and bisections of one return; five to eight are usual
+constexpr int most_steps = 100;
+
+/// Accuracy of the largest principal stress of a return, over the size of the stresses
+constexpr double accuracy = 1e-12;
+
+/// By how much the largest tension is below the tensile strength, relatively. There the criterion ends, with a slope
+/// without limit.
+constexpr double distance_to_end = 1e-6;
+} // namespace
+
+Criterion criterion(const HoekBrown& law)
+{
+  const auto [mb, s, a] = hoek_brown_constants(law);
+  const double strength = s * law.intact_strength / mb; // in tension
+  Criterion c{elastic_moduli(law.young, law.poisson),
+              law.poisson,
+              law.intact_strength,
+              mb,
+              s,
+              a,
+              law.strength_factor,
+              law.dilation_ratio,
+              std::min(law.tension_cutoff, (1 - distance_to_end) * strength),
+              0};
+  const auto excess = [&](double y) { return tangent_at(c, y).touch - c.tension; };
+  double low = 1e-3 * distance_to_end * s, high = s;
+  while (excess(high) > 0)
+    high *= 2;
+  c.y_least = root_between(excess, {low, excess(low)}, {high, excess(high)});
+  return c;
+}
+
+Principal change_by_flow(const Surface& m, const mohr_coulomb::Matrix3& map, Principal trial, Returned returned)
+{
+  const double d1 = trial.s1 - returned.stress.s1, d2 = trial.s2 - returned.stress.s2,
+               d3 = trial.s3 - returned.stress.s3;
+  const double twice_shear = 2 * m.moduli.shear;
+  const double volumetric = (d1 + d2 + d3) * m.moduli.lambda / (3 * m.moduli.lambda + twice_shear);
+  const double e2 = (d2 - volumetric) / twice_shear, e3 = (d3 - volumetric) / twice_shear; // plastic strains
+  // Multipliers of the plane between s1 and s3, and of the second one of an edge; each changes both of its strains by
+  // a half per sine.
+  double first = -2 * e3 / (1 - m.sin_psi), second = 0;
+  std::array<double, 3> change{0.5 * first, 0, 0.5 * first};
+  if (returned.region == Region::compression_edge) // between s2 and s3
+  {
+    second = 2 * e2 / (1 + m.sin_psi);
+    change = {0.5 * (first - second), 0.5 * second, 0.5 * first};
+  }
+  else if (returned.region == Region::extension_edge) // between s1 and s2
+  {
+    second = -2 * e2 / (1 - m.sin_psi);
+    change = {0.5 * (first + second), 0.5 * second, 0.5 * first};
+  }
+  const double mean = m.moduli.lambda * (change[0] + change[1] + change[2]);
+  std::array<double, 3> result{};
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j)
+      result[i] -= map[i][j] * (mean + twice_shear * change[j]);
+  return {result[0], result[1], result[2]};
+}
+
+/// Whether a trial stress is admissible; false as well where the strength is divided, for which there is no formula
+static bool is_inside(const Criterion& c, Principal trial)
+{
+  if (c.factor != 1 || trial.s1 > c.tension)
+    return false;
+  const double y = c.s - trial.s1 * c.mb / c.intact_strength;
+  const double allowed = c.intact_strength * std::pow(y, c.a), difference = trial.s1 - trial.s3;
+  return difference <= allowed + accuracy * (std::abs(trial.s1) + std::abs(trial.s3));
+}
+
+Solution return_to_criterion(const Criterion& c, Principal trial)
+{
+  if (is_inside(c, trial))
+    return {{trial, Region::elastic}, {}, {}, true};
+  double y = std::max(c.y_least, c.s - trial.s1 * c.mb / c.intact_strength);
+  double low = 0, high = std::numeric_limits<double>::infinity();
+  Solution solution{};
+  for (int step = 0; step < most_steps; ++step)
+  {
+    const Tangent t = tangent_at(c, y);
+    const Surface m = surface_of(c, t);
+    const Returned returned = mohr_coulomb::return_to_surface(m, trial);
+    const double excess = returned.stress.s1 - t.touch;
+    const double size = t.size + std::abs(trial.s1) + std::abs(trial.s3);
+    solution = {returned, m, t, std::abs(excess) <= accuracy * size};
+    if (solution.converged)
+      return solution;
+    (excess > 0 ? high : low) = y;
+    double slope = -t.touch_per_y;
+    if (t.sin_psi_per_y != 0 && returned.region != Region::elastic)
+      slope += t.sin_psi_per_y * change_by_flow(m, mohr_coulomb::region_map(m, returned.region), trial, returned).s1;
+    const double next = std::max(c.y_least, y - excess / slope);
+    const bool within = next > low && next < high;
+    y = within ? next : (high < std::numeric_limits<double>::infinity() ? 0.5 * (low + high) : 2 * y);
+  }
+  return solution;
+}
+
+namespace
+{
+/// Derivative of the returned principal stresses by the trial ones: that of the return to the tangent, and what the
+/// flow changes as its point moves along the criterion.
+mohr_coulomb::Matrix3 map_of(const Solution& solution, Principal trial)
+{
+  const auto& [returned, m, t, converged] = solution;
+  mohr_coulomb::Matrix3 map = mohr_coulomb::region_map(m, returned.region);
+  if (t.sin_psi_per_y == 0)
+    return map;
+  const Principal change = change_by_flow(m, map, trial, returned);
+  const std::array<double, 3> by_y{change.s1 * t.sin_psi_per_y, change.s2 * t.sin_psi_per_y,
+                                   change.s3 * t.sin_psi_per_y};
+  const std::array<double, 3> first = map[0];
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j)
+      map[i][j] += by_y[i] * first[j] / (t.touch_per_y - by_y[0]);
+  return map;
+}
+} // namespace
+} // namespace hoek_brown
+
+HoekBrownConstants hoek_brown_constants(const HoekBrown& law)
+{
+  const double below = law.geological_strength_index - 100;
+  return {law.intact_constant * std::exp(below / (28 - 14 * law.disturbance_factor)),
+          std::exp(below / (9 - 3 * law.disturbance_factor)),
+          0.5 + (std::exp(-law.geological_strength_index / 15) - std::exp(-20.0 / 3)) / 6};
+}
+
+double p_wave_modulus(const HoekBrown& law) { return p_wave_modulus(elastic_moduli(law.young, law.poisson)); }
+
+template <int D>
+BatchReport update(const HoekBrown& law, const PointBatch<D>& points)
+{
+  using namespace hoek_brown;
+  constexpr std::size_t entries = n_stress<D> * n_stress<D>;
+  const Criterion c = criterion(law);
+  const double bulk = bulk_modulus(c.moduli);
+  if (points.tangent)
+    fill_elastic_tangent<D>(c.moduli, points.size, points.tangent);
+  BatchReport report;
+  for (Index i = 0; i < points.size; ++i)
+  {
+    SymTensor<D> trial = elastic_trial<D>(c.moduli, points, i);
+    const bool usable = is_usable<D>(trial);
+    double& separation = points.state[1][i];
+    const double closed = usable ? close_separation<D>(trial, separation, bulk) : 0.0;
+    const mohr_coulomb::Spectral<D> spectrum = mohr_coulomb::spectral(trial);
+    const Solution solution = usable ? return_to_criterion(c, spectrum.stress) : Solution{};
+    if (!solution.converged)
+    {
+      report.failed.push_back(i);
+      continue;
+    }
+    const Returned& returned = solution.returned;
+    const bool plastic = returned.region != Region::elastic;
+    const SymTensor<D> stress = plastic ? recomposed(returned.stress, spectrum.frame) : trial;
+    for (std::size_t k = 0; k < n_stress<D>; ++k)
+      points.stress[k][i] = stress[k];
+    points.state[0][i] += deviatoric_plastic_strain(solution.surface, spectrum.stress, returned.stress);
+    separation += tension_beyond_apex(spectrum.stress, returned) / bulk - closed;
+    report.plastic += plastic ? 1 : 0;
+    if (!points.tangent)
+      continue;
+    double* const tangent = points.tangent + static_cast<std::size_t>(i) * entries;
+    if (plastic)
+      write_tangent<D>(solution.surface, map_of(solution, spectrum.stress), spectrum, returned, tangent);
+    if (closed > 0 && separation > 0)
+      remove_volumetric_part<D>(tangent);
+  }
+  return report;
+}
+
+template BatchReport update<2>(const HoekBrown&, const PointBatch<2>&);
+template BatchReport update<3>(const HoekBrown&, const PointBatch<3>&);
+} // namespace mpm::materials
