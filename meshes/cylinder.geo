@@ -28,3 +28,4 @@ EndFor
 Physical Surface("soil", 1) = {1:arcs};
 Physical Curve("bottom", 1) = {3000};
 Physical Curve("left", 2) = {3000 + arcs};
+Physical Curve("outer", 3) = {1000:1000 + arcs - 1};

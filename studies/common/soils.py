@@ -28,6 +28,7 @@ MATERIALS = (
     "cam-clay",
     "nor-sand",
     "sanisand",
+    "hoek-brown",
     "elastic",
 )
 TOYOURA = {
@@ -51,7 +52,10 @@ ONLY_WITH = {
     ("--secant-modulus", "--oedometer-modulus", "--unloading-modulus", "--unloading-poisson", "--stiffness-exponent",
      "--normal-k0", "--failure-ratio", "--vertical-preconsolidation", "--reference-pressure", "--small-strain-modulus",
      "--threshold-strain"): ("hardening-soil",),
-    ("--friction-angle", "--dilation-angle", "--tension-cutoff"): FRICTIONAL,
+    ("--intact-strength", "--geological-strength-index", "--intact-constant", "--disturbance-factor",
+     "--dilation-ratio"): ("hoek-brown",),
+    ("--friction-angle", "--dilation-angle"): FRICTIONAL,
+    ("--tension-cutoff",): (*FRICTIONAL, "hoek-brown"),
     ("--cohesion",): (*FRICTIONAL, "tresca", "von-mises"),
     ("--young",): tuple(name for name in MATERIALS if name not in ("cam-clay", "nor-sand", "sanisand", "hardening-soil")),
     ("--poisson",): tuple(name for name in MATERIALS if name not in ("sanisand", "hardening-soil")),
@@ -95,6 +99,9 @@ def add_law_options(
                                   ("reference_pressure", 100e3, None), ("small_strain_modulus", 0.0, None),
                                   ("threshold_strain", 2e-4, None)]:  # fmt: skip
         add_parameter(p, mpm.HardeningSoil, name, default, "Hardening Soil: ", option)
+    for name, default in [("intact_strength", 20e6), ("geological_strength_index", 40.0), ("intact_constant", 8.0),
+                          ("disturbance_factor", 0.0), ("dilation_ratio", 0.0)]:  # fmt: skip
+        add_parameter(p, mpm.HoekBrown, name, default, "Hoek-Brown: ")
     p.add_argument("--sanisand", nargs="*", default=[], metavar="NAME=VALUE",
                    help="SANISAND: parameters that differ from those of Toyoura sand, such as void_ratio=0.75 dilatancy=0.5; "
                         "docs/api/law_parameters.md has all of them with their units")  # fmt: skip
@@ -281,6 +288,12 @@ def _skeleton(a: argparse.Namespace) -> Any:
                 normal_k0=a.normal_k0, failure_ratio=a.failure_ratio,
                 vertical_preconsolidation=a.vertical_preconsolidation, reference_pressure=a.reference_pressure,
                 small_strain_modulus=a.small_strain_modulus, threshold_strain=a.threshold_strain,
+            )  # fmt: skip
+        case "hoek-brown":
+            return mpm.HoekBrown(
+                **elastic, intact_strength=a.intact_strength, geological_strength_index=a.geological_strength_index,
+                intact_constant=a.intact_constant, disturbance_factor=a.disturbance_factor,
+                dilation_ratio=a.dilation_ratio, tension_cutoff=a.tension_cutoff,
             )  # fmt: skip
         case "sanisand":
             return sanisand_of(a.sanisand)

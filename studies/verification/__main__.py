@@ -47,6 +47,7 @@ GROUPS = {
         "pipe_factor",
         "pushed_footing",
         "retaining_wall",
+        "hoek_brown",
         "strength_ratio",
         "weak_layer",
         "weak_plane",

@@ -15,7 +15,7 @@ import mpm_core as mpm
 from .keys import INTERFACE
 from .laws import is_number
 
-WITHOUT_MEMORY = (mpm.LinearElastic, mpm.MohrCoulomb, mpm.ViscoplasticMohrCoulomb, mpm.DruckerPrager)
+WITHOUT_MEMORY = (mpm.LinearElastic, mpm.MohrCoulomb, mpm.ViscoplasticMohrCoulomb, mpm.DruckerPrager, mpm.HoekBrown)
 """Laws that may change in a stage without losing what the soil has gone through"""
 
 

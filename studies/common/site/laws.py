@@ -159,6 +159,7 @@ NEEDED_BY: Mapping[str, Sequence[Any]] = {
     "hardening-soil": (mpm.HardeningSoil,),
     "cam-clay": (mpm.CamClay,),
     "nor-sand": (mpm.NorSand,),
+    "hoek-brown": (mpm.HoekBrown,),
     "elastic": (mpm.LinearElastic,),
 }
 """Laws whose parameters without a default a material needs; those of `tresca` and `von-mises` are stiffness and strength"""
@@ -245,7 +246,7 @@ def is_profile(value: dict) -> bool:
 
 MODULI = ("young", "secant_modulus", "oedometer_modulus", "unloading_modulus", "small_strain_modulus")
 STRESSES = ("preconsolidation", HISTORY, "reference_pressure")
-LEAST = dict.fromkeys(MODULI, 1e5) | dict.fromkeys(STRENGTHS, 50.0) | dict.fromkeys(STRESSES, 1e3)
+LEAST = dict.fromkeys(MODULI, 1e5) | {"intact_strength": 1e5} | dict.fromkeys(STRENGTHS, 50.0) | dict.fromkeys(STRESSES, 1e3)
 """Parameters [Pa] below which a soil of a site is probably given in kPa or MPa"""
 
 
