@@ -53,7 +53,7 @@ def secant_doubt(law: Any, where: str) -> str:
             return (
                 f"{where}: secant_modulus is {soil.secant_modulus:.3g} Pa, but a drained triaxial test under {soil.reference_pressure:.3g} Pa gives "
                 f"{found:.3g} Pa at half of the strength, since compression by the cap adds to the shear: oedometer_modulus is "
-                f"{soil.oedometer_modulus:.3g} Pa. Raise secant_modulus where it is that of such a test (docs/howto/soils.md)"
+                f"{soil.oedometer_modulus:.3g} Pa. Raise secant_modulus where it is that of such a test (docs/howto/soils/hardening_soil.md)"
             )
     return ""
 
