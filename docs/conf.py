@@ -15,6 +15,8 @@ myst_heading_anchors = 3
 exclude_patterns = ["_build"]
 html_theme = "sphinx_rtd_theme"
 html_title = "Talus"
+html_static_path = ["_static"]
+html_css_files = ["talus.css"]
 # Formulas without a network: Debian's MathJax 2 is copied to the pages; elsewhere they load MathJax from the network.
 MATHJAX = Path("/usr/share/javascript/mathjax")
 if MATHJAX.is_dir():
