@@ -209,7 +209,7 @@ class GroundColumn:
         if self._water:
             force[:, -1] += self._water.loads_of(self.time)
             self._water.accelerate(self.dt, force, self._is_held(), self.time)
-        if self._rayleigh.mass > 0:  # as gravity, on soil and water alike (docs/water.md)
+        if self._rayleigh.mass > 0:  # as gravity, on soil and water alike (docs/water_particles.md)
             rate = self._rayleigh.mass * lumped(self._mass * damped)
             force -= rate[:, None] * self._velocity_of_soil()
         change = self.dt * force / self._nodal_mass[:, None]

@@ -29,7 +29,7 @@ class GroundWater:
     """Pore water of layers, with a velocity w of its own beside that of the soil v, as in explicit steps of a model.
 
     The levels have the mean velocity of both, weighted by their masses, which the column knows, and the relative velocity w - v.
-    The equations are (W6) and (W7) of ``docs/water.md`` for a unit of area. The base is impervious; the surface drains.
+    The equations are (W6) and (W7) of ``docs/water_particles.md`` for a unit of area. The base is impervious; the surface drains.
 
     Args:
         thickness: of the layers [m], (n).

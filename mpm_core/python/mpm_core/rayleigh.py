@@ -20,7 +20,7 @@ class Rayleigh:
     damping. It stands for the hysteresis of soil below its yield surface; where soil yields, its law damps alone.
 
     In explicit runs with pore water, ``stiffness`` counts the effective stresses only, and ``mass`` acts on soil and water by the
-    velocity of the soil, so that it does not change the flow of water through the soil (docs/water.md).
+    velocity of the soil, so that it does not change the flow of water through the soil (docs/water_particles.md).
 
     Args:
         mass: alpha [1/s]. It slows down all motion, that of a rigid body too.

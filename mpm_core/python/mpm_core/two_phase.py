@@ -76,7 +76,7 @@ def of_suction(model: Model) -> str:
         return ""
     return (
         f"; another cause is water that its suction_limit of {water.suction_limit:g} Pa draws in at the surface of soil that conducts well: "
-        "take suction_limit=0 there (docs/water.md)"
+        "take suction_limit=0 there (docs/water_particles.md)"
     )
 
 
