@@ -22,7 +22,7 @@ def reduced_strength(law: Laws, factor: float, unreduced: Collection[int | str] 
     - SofteningMohrCoulomb: peak and residual strength alike.
     - DruckerPrager: strength and slope of the cone. Of one that matches a soil of Mohr and Coulomb this is more than c / F and
       tan(phi) / F: factors of safety are smaller than those of the soil, by a twentieth for 25 degrees and by a sixth for 38
-      (docs/fem.md).
+      (docs/factor_of_safety.md).
     - CamClay, NorSand and Sanisand: the friction angle of the critical state, sin(phi) = 3M / (6 + M); attraction as it is.
     - ViscoplasticMohrCoulomb: the strength in the limit of slow loading; the viscosity stays.
     - Heterogeneous: the strength of all points.

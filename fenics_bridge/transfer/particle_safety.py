@@ -85,7 +85,7 @@ def particle_safety(
         rest: out-of-balance over external force at which the soil counts as at rest [-].
         nmd: average volumetric strains over nodes; without it the factor is that of linear finite elements on the same cells. In soil
             that dilates less than by its friction angle strains are averaged in part, and factors on coarse cells are higher than
-            those of finite elements with `nmd` (docs/fem.md).
+            those of finite elements with `nmd` (docs/factor_of_safety.md).
         progress: function that is called with each step of the factor, e.g. `print_step`.
 
     Returns:

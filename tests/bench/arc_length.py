@@ -1,4 +1,4 @@
-"""An arc-length method for finite elements, as a measure of what it carries: for the table of solvers in docs/fem.md.
+"""An arc-length method for finite elements, as a measure of what it carries: for the table of solvers in docs/factor_of_safety.md.
 
 The load factor is an unknown of the step, whose length in displacement is given: the updated normal plane of Ramm (1981, in
 Nonlinear Finite Element Analysis in Structural Mechanics, 63-89), with the consistent tangent. A step that does not converge is

@@ -1,4 +1,4 @@
-"""Factors of safety of the embankment of docs/fem.md: strengths of the fill, dilation angles and cell sizes.
+"""Factors of safety of the embankment of docs/factor_of_safety.md: strengths of the fill, dilation angles and cell sizes.
 
     python3 tests/bench/embankment.py --cell-sizes 0.5 0.25
 

@@ -1,4 +1,4 @@
-"""Factors of safety of a slope without dilation, by solver, element and cell size: the table of docs/fem.md.
+"""Factors of safety of a slope without dilation, by solver, element and cell size: the table of docs/factor_of_safety.md.
 
     python3 tests/bench/safety_solvers.py --cell-sizes 2 1 0.5
 
