@@ -150,7 +150,7 @@ def parse(arguments: list[str] | None = None) -> Namespace:
 
 def choose_slide(p: ArgumentParser, options: Namespace) -> None:
     """Fill in law, damping and duration: those with which the slope comes to rest at a place that hardly depends on the cells
-    (docs/integration.md), or the paper's. Slopes of one shape slide alike, in times in proportion to the square root of
+    (docs/run_out.md), or the paper's. Slopes of one shape slide alike, in times in proportion to the square root of
     their height; a viscosity is a stress multiplied by a time.
     """
     slowness = math.sqrt(options.height)  # of the slope relative to one of 1 m

@@ -29,7 +29,7 @@ class Rayleigh:
             the water's wave, by which the step is short, is not damped.
         plastic_strain: accumulated plastic deviatoric strain of a point above which its cell is no longer damped [-]; the
             stresses of ``stiffness`` would strengthen a shear band, and the forces of ``mass`` brake a slide. Infinite where they
-            are to brake it, as in the place of local damping (docs/integration.md).
+            are to brake it, as in the place of local damping (docs/run_out.md).
 
     Raises:
         InputError: a number that is negative.

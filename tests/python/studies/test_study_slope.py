@@ -127,7 +127,7 @@ def test_what_brakes_a_slide_unless_told_otherwise(options, material, damping, m
 
 
 def test_the_slope_comes_to_rest_where_smaller_cells_have_it(tmp_path):
-    # On cells of 0.1, 0.05, 0.025 and 0.0125 m: docs/integration.md
+    # On cells of 0.1, 0.05, 0.025 and 0.0125 m: docs/run_out.md
     crest = {}
     for cell in ("0.1", "0.05"):
         folder = tmp_path / cell
