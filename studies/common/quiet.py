@@ -10,7 +10,7 @@ NOT_REACHED = "the load was not reached"
 """Beginning of the warning of finite elements that found no equilibrium"""
 GATHERS = "the soil fails with nmd=True and integration=PARTICLES"
 """Beginning of the warning that mixed integration suits a slide better. Beside bodies that move soil it does not: soil that is pushed
-up fills cells in part, and mixed integration then generates energy (docs/contact.md), which sums over particles do not."""
+up fills cells in part, and mixed integration then generates energy (docs/contact_studies.md), which sums over particles do not."""
 LOCKS = "linear (cells|elements)|the soil fails, and its dilation angle"
 """Beginnings of the warnings of linear cells and elements that lock"""
 
