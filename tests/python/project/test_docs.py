@@ -65,6 +65,12 @@ def test_every_block_says_what_it_is(page):
     assert re.findall(r"\n\n {4}\S.*", BLOCK.sub("", page.read_text())) == []
 
 
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_no_line_of_a_page_begins_with_a_per_cent_sign(page):
+    """MyST takes such a line for a comment and leaves it out."""
+    assert re.findall(r"^\s*%.*", BLOCK.sub("", page.read_text()), re.MULTILINE) == []
+
+
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "toml")], ids=name)
 def test_toml_blocks_are_parameters_of_the_study_that_the_page_runs_with_them(page, tmp_path, capsys):
     for block in blocks(page, "toml"):
