@@ -13,8 +13,12 @@ namespace
 /// Steps of Newton's method and bisections of one return; five to eight are usual
 constexpr int most_steps = 100;
 
-/// Accuracy of the largest principal stress of a return, over the size of the stresses
+/// By how much the largest principal stress of a return may be off the point where its tangent touches, over the size
+/// of the stresses. It is small, as the criterion is strongly curved near its end in tension.
 constexpr double accuracy = 1e-12;
+
+/// By how much a stress may be outside and count as elastic, such as one that was returned
+constexpr double round_off = 1e-12;
 
 /// By how much the largest tension is below the tensile strength, relatively. There the criterion ends, with a slope
 /// without limit.
@@ -79,7 +83,7 @@ static bool is_inside(const Criterion& c, Principal trial)
     return false;
   const double y = c.s - trial.s1 * c.mb / c.intact_strength;
   const double allowed = c.intact_strength * std::pow(y, c.a), difference = trial.s1 - trial.s3;
-  return difference <= allowed + accuracy * (std::abs(trial.s1) + std::abs(trial.s3));
+  return difference <= allowed + round_off * (std::abs(trial.s1) + std::abs(trial.s3));
 }
 
 Solution return_to_criterion(const Criterion& c, Principal trial)
@@ -88,7 +92,6 @@ Solution return_to_criterion(const Criterion& c, Principal trial)
     return {{trial, Region::elastic}, {}, {}, true};
   double y = std::max(c.y_least, c.s - trial.s1 * c.mb / c.intact_strength);
   double low = 0, high = std::numeric_limits<double>::infinity();
-  Solution solution{};
   for (int step = 0; step < most_steps; ++step)
   {
     const Tangent t = tangent_at(c, y);
@@ -96,9 +99,8 @@ Solution return_to_criterion(const Criterion& c, Principal trial)
     const Returned returned = mohr_coulomb::return_to_surface(m, trial);
     const double excess = returned.stress.s1 - t.touch;
     const double size = t.size + std::abs(trial.s1) + std::abs(trial.s3);
-    solution = {returned, m, t, std::abs(excess) <= accuracy * size};
-    if (solution.converged)
-      return solution;
+    if (std::abs(excess) <= accuracy * size)
+      return {returned, m, t, true};
     (excess > 0 ? high : low) = y;
     double slope = -t.touch_per_y;
     if (t.sin_psi_per_y != 0 && returned.region != Region::elastic)
@@ -107,7 +109,7 @@ Solution return_to_criterion(const Criterion& c, Principal trial)
     const bool within = next > low && next < high;
     y = within ? next : (high < std::numeric_limits<double>::infinity() ? 0.5 * (low + high) : 2 * y);
   }
-  return solution;
+  return {}; // not converged
 }
 
 namespace
