@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 import mpm_core as mpm
 from fenics_bridge.errors import InputError, agree
+from fenics_bridge.fem.deconfinement import warn_of_held
 from fenics_bridge.fem.load_steps import LoadStep, advance
 from fenics_bridge.fem.loads import Load
 from fenics_bridge.fem.locking import warn_of_few_cells, warn_of_locking_at_failure
@@ -119,7 +120,7 @@ def factor_of_safety(
 
     Args:
         model: finite elements, unloaded or in equilibrium under a load on the way to `load`, with any law that `reduce` knows.
-        load: load under which the factor is found.
+        load: load under which the factor is found; forces that it holds after a stage with a deconfinement support the body, with a warning.
         start: factor to begin with, below 1 with more strength than the laws have. Where the body then carries a part of the load only, it is
             halved, up to three times.
         first_step: first increment of the factor.
@@ -140,6 +141,7 @@ def factor_of_safety(
             f"model is {type(model).__name__}, expected a QuasiStatic or a MixedQuasiStatic; for particles there is "
             "particle_safety"
         )
+    warn_of_held(model.domain.comm, load)
     law = model.law
     unreduced = _tags_of(model, law, unreduced)
 

@@ -14,6 +14,7 @@ from fenics_bridge.compat import cell_dofs
 from fenics_bridge.errors import agree
 from fenics_bridge.fem.active_cells import cells_there, reconfigure, switch_off
 from fenics_bridge.fem.at_rest import rows_of, stress_at_rest, warn_beyond_strength
+from fenics_bridge.fem.deconfinement import reached_by, require_released
 from fenics_bridge.fem.load_steps import LoadStep
 from fenics_bridge.fem.loads import Load
 from fenics_bridge.fem.overconsolidation import before_equilibrium, hardened, upward
@@ -97,7 +98,8 @@ class FemSite:
         fem = self.fem
         state, _, _ = self.state.after(stage)
         ratios = state.overconsolidation_of(stage, self._laws(state))
-        steps = fem.solve(self._begin(stage, state, ratios), **self._options)
+        load = self._begin(stage, state, ratios)
+        steps = fem.solve(reached_by(stage, fem.load, load, state), **self._options)
         self.number += 1
         if not fem.converged:
             raise StageError(self._failure(stage, steps), 1.0 - fem.load.held)
@@ -122,8 +124,8 @@ class FemSite:
             The load after the last one, for `factor_of_safety`. It does not act yet.
 
         Raises:
-            InputError: there is no stage, one was carried out before, or one has an unknown soil or boundary or prescribes a
-                displacement. Raised on all ranks alike.
+            InputError: there is no stage, one was carried out before, one has an unknown soil or boundary or prescribes a
+                displacement, or the last one has a deconfinement below 1. Raised on all ranks alike.
             StageError: a stage before the last one with a `strength_ratio` has no equilibrium.
 
         Example:
@@ -134,6 +136,9 @@ class FemSite:
         agree(comm, f"stage {self.number} has been carried out, expected a new site" if self.number else None)
         agree(comm, None if stages else "stages is empty, expected those of the site")
         require_stages(self, stages)
+        require_released(
+            comm, stages[-1], "it is the last one, and soil at once is held by no forces; carry_out has them"
+        )
         moved = [stage.name for stage in stages if any(v for one in stage.support for v in one.displacement or ())]
         agree(comm, f"stage {moved[0]!r}: support prescribes a displacement: carry_out applies it" if moved else None)
         last = max((number for number, stage in enumerate(stages) if stage.strength_ratio), default=0)

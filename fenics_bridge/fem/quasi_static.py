@@ -354,7 +354,8 @@ class QuasiStatic(ReinforcedBody, WetBody, SupportedBody, PointFunctions):
         return self._body.internal_forces(self.points.stress).array
 
     def _nodal_reactions(self) -> tuple[Any, NDArray[np.float64], MeshTags, Sequence[Support]]:
-        out_of_balance = self._loads.forces(self.load) - self._internal_forces()
+        # Forces that hold the body since a stage include the reactions from before it.
+        out_of_balance = self._loads.forces(replace(self.load, held=0.0)) - self._internal_forces()
         return self.displacement.function_space, out_of_balance, self.facet_tags, self.supports
 
     def reaction(self, facet_tag: int | str) -> NDArray[np.float64]:

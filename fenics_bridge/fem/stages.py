@@ -13,6 +13,7 @@ from mpm_core.input_warnings import warn_of_water_weight
 from mpm_core.members import Member
 
 from fenics_bridge.errors import InputError, agree, is_finite
+from fenics_bridge.fem.deconfinement import wrong_deconfinement
 from fenics_bridge.fem.k0 import LARGEST_K0, Surface, surface_height
 from fenics_bridge.fem.overconsolidation import LARGEST, require_history
 from fenics_bridge.fem.strength_ratio import StrengthRatio, require_cohesive
@@ -70,6 +71,8 @@ class Stage:
     is that at the end of this stage; from the next one on the force follows the deformation"""
     remove: Any = ()
     """Names of members, one or several, that are taken out"""
+    deconfinement: float = 1.0
+    """Fraction of the out-of-balance forces of this stage that it releases, above 0; the next stage releases what is still held with its own"""
 
     def __post_init__(self) -> None:
         for name in ("fill", "excavate", "release", "support", "remove"):
@@ -387,4 +390,4 @@ def _wrong_value(stage: Stage, where: str) -> str | None:
     for key, law in stage.law.items():
         if not isinstance(law, tuple(_core.law_types)):
             return f"{where}law is {law!r} for {key!r}, expected a constitutive law such as MohrCoulomb(...)"
-    return None
+    return wrong_deconfinement(stage, where)

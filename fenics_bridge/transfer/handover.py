@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 import mpm_core as mpm
 from fenics_bridge.errors import agree
+from fenics_bridge.fem.deconfinement import refuse_held
 from fenics_bridge.fem.elastic import ElasticSolution
 from fenics_bridge.fem.evaluate import PointSearch
 from fenics_bridge.fem.geometry import Geometry, require_same_geometry
@@ -240,6 +241,8 @@ def _require_usable(
 ) -> None:
     solved = not isinstance(fem, QuasiStatic) or fem.converged
     agree(model.comm, None if solved else "fem has not been solved, or its last solution did not converge")
+    if isinstance(fem, QuasiStatic):
+        refuse_held(model.comm, fem)
     require_same_geometry(model, fem)
     agree(
         model.comm,

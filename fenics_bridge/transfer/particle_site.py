@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 import mpm_core as mpm
 from fenics_bridge.errors import InputError, agree, real_numbers
 from fenics_bridge.fem.at_rest import warn_beyond_strength
+from fenics_bridge.fem.deconfinement import refuse_held, require_released
 from fenics_bridge.fem.fem_site import FemSite
 from fenics_bridge.fem.overconsolidation import before_equilibrium, hardened, upward
 from fenics_bridge.fem.small_strains import without_memory
@@ -97,6 +99,7 @@ class ParticleSite:
         model = self.model
         state, fill, excavate = self.state.after(stage)
         self._refuse_members(stage)
+        require_released(model.comm, stage, "particles release all forces at once; take over those of a FemSite")
         material = {
             **self._material,
             **{tag: self._number_of(state.law[tag], stage) for tag in stage_laws(stage, state)},
@@ -172,6 +175,7 @@ class ParticleSite:
             InputError: particles have had a stage, a soil has no law, or as `initialise`. Raised on all ranks alike.
         """
         model, state = self.model, site.state
+        refuse_held(model.comm, site.fem)
         agree(
             model.comm,
             f"stage {self.number} has been carried out, expected none before take_over" if self.number else None,
@@ -187,12 +191,13 @@ class ParticleSite:
         apply_supports(model, state.supports)
         self._load(state)
         self.state, self.number = self.state.at(state), site.number
-        nmd, reached = self._options.get("nmd"), site.fem.converged
-        site.fem.converged = True  # after a stage that failed, too, they are in equilibrium with what acts of it
+        fem, nmd, reached = site.fem, self._options.get("nmd"), (site.fem.converged, site.fem.load)
+        # After a stage that failed, too, they are in equilibrium with what acts of it; what is still held moves the particles.
+        fem.converged, fem.load = True, replace(fem.load, held=0.0)
         try:
-            return initialise(model, site.fem, count_displacement=False, equilibrate=False, nmd=nmd)
+            return initialise(model, fem, count_displacement=False, equilibrate=False, nmd=nmd)
         finally:
-            site.fem.converged = reached
+            fem.converged, fem.load = reached
 
     def _refuse_members(self, stage: Stage) -> None:
         where, expected = f"stage {stage.name!r}: ", "quasi-static particles have no members"

@@ -30,13 +30,13 @@ def plastic(soils):
 
 
 def dug(folder, comm, **options):
-    """Stresses and displacements after an excavation with water, load and a support that goes."""
+    """Stresses and displacements after an excavation with water and load, of which one stage leaves a part to the next."""
     site = site_of(mesh_of("pit", folder, comm), plastic(SOILS["pit"]), **options)
     stages = [
         bridge.Stage(
             "in situ", fill=SOILS["pit"], unit_weight=weights(SOILS["pit"]), pore_pressure=bridge.hydrostatic(2.0)
         ),
-        bridge.Stage("dig 1", excavate="pit 1", reset_displacement=True),
+        bridge.Stage("dig 1", excavate="pit 1", reset_displacement=True, deconfinement=0.6),
         bridge.Stage("dig 2", excavate="pit 2", pressure={"floor": 5e3}, pore_pressure=bridge.hydrostatic(1.0)),
     ]
     reports = list(bridge.carry_out(site, stages))

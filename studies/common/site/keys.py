@@ -57,9 +57,9 @@ MEMBERS: dict[str, Callable] = {"bar": mpm.bar, "strut": mpm.strut, "beam": mpm.
 """Function that makes a structural member of each kind"""
 STAGE_KEYS = (
     "name", "day", "duration", "fill", "excavate", "boundaries", "law", "unit_weight", "pressure", "support", "release",
-    "water_level", "steady_flow", "reset_displacement", "install", "remove",
+    "water_level", "steady_flow", "reset_displacement", "install", "remove", "deconfinement",
 )  # fmt: skip
-CHANGES = ("excavate", "law", "unit_weight", "pressure", "support", "release", "install", "remove")
+CHANGES = ("excavate", "law", "unit_weight", "pressure", "support", "release", "install", "remove", "deconfinement")
 """What a stage may change beside soils that it places"""
 STAGE_WATER = ("water_level", "steady_flow")
 """Keys of a stage that give it pore pressures"""

@@ -68,6 +68,7 @@ def stage_of(given: Mapping[str, Any], number: int, site: Site, laws: Mapping[st
         reset_displacement=reset,
         install={name: site.members[name] for name in install},
         remove=remove,
+        deconfinement=given.get("deconfinement", 1.0),
     )  # fmt: skip
 
 
