@@ -1,7 +1,7 @@
 """Stages that release only a part of their out-of-balance forces, as the core of a tunnel does ahead of its lining.
 
 The rest stays as nodal forces that hold the body (`Load.held`), until a later stage releases them with what it changes itself. This is the
-convergence-confinement method in plane strain (Panet 1995, Le calcul des tunnels par la methode convergence-confinement).
+convergence-confinement method in plane strain (Panet 1995, Le calcul des tunnels par la méthode convergence-confinement).
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ comm = MPI.COMM_WORLD
 GROUPS = {
     "Closed forms": ("column", "bar", "incline", "thick_cylinder", "manufactured", "finite_column", "elastica",
                      "ground_water", "coupled_consolidation", "wet_ground", "undrained_footing", "liakopoulos", "two_phase",
-                     "far_field", "impact", "members", "hardening_soil", "small_strain",
+                     "far_field", "impact", "members", "tunnel", "hardening_soil", "small_strain",
                      "creep"),  # fmt: skip
     "Contact": ("contact_slope", "voellmy"),
     "Earthquakes": ("newmark_block",),

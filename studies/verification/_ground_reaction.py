@@ -1,6 +1,6 @@
 """Ground reaction curve of a circular tunnel in Mohr-Coulomb ground under a hydrostatic stress, elastic and perfectly plastic.
 
-Salencon (1969, Int. J. Rock Mech. Min. Sci. 6, 231-236); Carranza-Torres (2003, ibid. 40, 629-639). The ground ends at a rigid circle, far away in
+Salençon (1969, Int. J. Rock Mech. Min. Sci. 6, 231-236); Carranza-Torres (2003, ibid. 40, 629-639). The ground ends at a rigid circle, far away in
 most uses. Compression is positive here, and the stress along the tunnel is the intermediate one.
 """
 
@@ -12,11 +12,15 @@ import numpy as np
 from scipy.optimize import brentq
 
 
+FURTHEST = 1e3
+"""Radii of the tunnel within which ground without an end yields"""
+
+
 @dataclass(frozen=True)
 class Ground:
     """The tunnel and its ground.
 
-    radius: of the tunnel [m]; outer: of the rigid circle [m]; pressure: stress before the tunnel [Pa]; angles in degrees
+    radius: of the tunnel [m]; outer: of the rigid circle [m], infinite for none; pressure: stress before the tunnel [Pa]; angles in degrees
     """
 
     radius: float
@@ -62,7 +66,8 @@ class Ground:
         def beyond(r: float) -> float:
             return (support + attraction) * (r / self.radius) ** (n - 1) - attraction - self.yielding(r)
 
-        return self.radius if beyond(self.radius) >= 0 else brentq(beyond, self.radius, self.outer, xtol=1e-12)
+        furthest = min(self.outer, FURTHEST * self.radius)
+        return self.radius if beyond(self.radius) >= 0 else brentq(beyond, self.radius, furthest, xtol=1e-12)
 
     def wall(self, support: float) -> float:
         """Inward displacement of the wall [m] under a pressure on it [Pa]."""
@@ -85,6 +90,18 @@ class Ground:
 
         at_edge = self.outside(edge, self.yielding(edge))
         return particular(self.radius) + (at_edge - particular(edge)) * (edge / self.radius) ** k
+
+    def lined(self, released: float, stiffness: float) -> float:
+        """Pressure on a lining [Pa] that comes when a fraction of the stress before the tunnel is released.
+
+        stiffness: pressure by which the lining gets smaller by 1 m, its axial stiffness over the square of its radius [Pa/m]
+        """
+        at_lining = self.wall((1 - released) * self.pressure)
+
+        def unbalanced(pressure: float) -> float:
+            return stiffness * (self.wall(pressure) - at_lining) - pressure
+
+        return brentq(unbalanced, 0.0, (1 - released) * self.pressure, xtol=1e-6)
 
     def intermediate(self, support: float) -> bool:
         """Whether the stress along the tunnel, which begins as the others, is the intermediate one at the wall."""

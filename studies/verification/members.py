@@ -6,6 +6,7 @@ where the axis of symmetry cuts it. The anchor and a soft spring hold a block on
 body of the anchor slips under the strength of the bond times its length.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,8 +43,12 @@ def lining_forces(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return PRESSURE * RADIUS * thrust, PRESSURE * RADIUS**2 * moment
 
 
-def lined_tunnel(size: float, edge_size: float) -> mpm.MemberForces:
-    """Forces in the lining from crown to invert. size: half of the width of the ground [m]; edge_size: of cells at the lining."""
+def lined_tunnel(size: float, edge_size: float, deconfinement: float | None = None) -> mpm.MemberForces:
+    """Forces in the lining from crown to invert.
+
+    size: half of the width of the ground [m]; edge_size: of cells at the lining [m]; deconfinement: fraction of the forces of the core that is
+    released before the lining comes, None for a lining that comes with the excavation
+    """
     mesh = bridge.read_mesh(
         Path(STUDIES).parent / "meshes" / "pipe.geo", MPI.COMM_WORLD,
         parameters={"size": size, "edge_size": edge_size, "far_size": size / 8},
@@ -63,8 +68,11 @@ def lined_tunnel(size: float, edge_size: float) -> mpm.MemberForces:
         bridge.Stage(
             "in situ", fill=list(weights), unit_weight=weights, stress=lambda x: np.tile(in_situ, (len(x), 1))
         ),
-        bridge.Stage("tunnel", excavate="pipe", install={"lining": lining}, reset_displacement=True),
+        bridge.Stage("tunnel", excavate="pipe", reset_displacement=True, deconfinement=deconfinement or 1.0),
+        bridge.Stage("lining", install={"lining": lining}),
     ]
+    if deconfinement is None:
+        stages[1:] = [replace(stages[1], install=stages[2].install)]
     list(bridge.carry_out(site, stages))
     return site.fem.member_forces("lining")
 
