@@ -24,6 +24,7 @@ from common.site.member_results import captions
 from common.solids.plots import captions_for
 from common.stages.flow import flow_lines
 from common.stages.runs import add_stage_options, carry_out
+from common.stages.surface import surface_lines
 from common.summary import write_summary
 from mpi4py import MPI
 
@@ -114,6 +115,7 @@ def main(arguments: list[str] | None = None) -> int:
         and not (site.members or site.begins_at_rest or site.soils_with_strength_ratio)
         else {}
     )
+    run.add_surface(site.stages)
     last = run.rows[-1] if run.rows else {}
     summary = {
         "finished_run": run.stopped is None, "stopped_because": run.stopped,
@@ -124,8 +126,10 @@ def main(arguments: list[str] | None = None) -> int:
     shown = {"stages_displacement": "The soil after each stage, by its displacement, with the water table where there is one",
                 "stages_flow": "Steady flow of the water around the walls: total head, flow lines and water table",
                 "stages_strain": "The soil after each stage, by the strain accumulated since the displacements were reset",
+                "surface": "Settlement of level ground at the surface after each stage",
                 "movements": "Largest movements after each stage", **captions(run.forces), **STRENGTHS}  # fmt: skip
     said = flow_lines(last.get("stage", ""), run.site.state.pore_pressure)
+    said += surface_lines(last)
     said += [COMPARED[name].format(value) if value is not None else NOT_CARRIED for name, value in compared.items()]
     drawn = {**run.drawn(site.stages, folder), **strength_pictures(site, run.site.fem, folder)}
     return write_summary(

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def wrong_deconfinement(stage: Stage, where: str) -> str | None:
     """Error in the deconfinement of a stage; None without an error. where: what begins the message."""
     given = stage.deconfinement
-    if not (is_finite(given) and 0 < given <= 1):
+    if isinstance(given, bool) or not (is_finite(given) and 0 < given <= 1):
         return f"{where}deconfinement is {given!r}, expected a fraction above 0 and up to 1, such as 0.4"
     if given == 1:
         return None

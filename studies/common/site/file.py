@@ -66,7 +66,7 @@ from .laws import (
 )
 from .law_doubts import DOUBTS
 from .mesh import check_soils, geometry_of, site_mesh
-from .stages import stage_of
+from .stages import stage_of, warn_of_held
 from .strength import law_of_table, ratio_of, with_strength_ratios, without_history
 from .supports import supports_of, warn_of_rigid_core
 
@@ -313,6 +313,7 @@ def site_of(
     site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, supports_of(table, path, domain, facet_tags), [],
                 list(others.values()), axisymmetric, rows, members, random, k0, ratios, weak)  # fmt: skip
     site.stages = [stage_of(given, k, site, others, path) for k, given in enumerate(rows)]
+    warn_of_held(site.stages, path)
     if beside.walls and not at_once:
         site.stages, further = in_stages(site.stages, laws, beside, lambda soil: site.tags_of([soil]))
         site.further_laws += further

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ import numpy as np
 import fenics_bridge as bridge
 import mpm_core as mpm
 
+from ..checks import say
 from .doubts import warn_of_depth, warn_of_dry_level, warn_of_slanting_water
 from .keys import require_push
 from .laws import is_number
@@ -70,6 +71,14 @@ def stage_of(given: Mapping[str, Any], number: int, site: Site, laws: Mapping[st
         remove=remove,
         deconfinement=given.get("deconfinement", 1.0),
     )  # fmt: skip
+
+
+def warn_of_held(stages: Sequence[bridge.Stage], path: Path) -> None:
+    """Warn of a last stage that does not release all of its out-of-balance forces; path: of the site's file."""
+    last = stages[-1].deconfinement if stages else 1.0
+    if is_number(last) and 0 < last < 1:
+        say(f"{path}: the last stage, {stages[-1].name!r}, has deconfinement = {last:g}, so that forces which nothing built bears hold {1 - last:.0%} of "
+            "what it changes to the end; a stage after it releases them, such as one that installs the lining")  # fmt: skip
 
 
 def _member_names(given: Mapping[str, Any], key: str, site: Site, where: str) -> list[str]:

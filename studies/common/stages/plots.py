@@ -23,6 +23,7 @@ from ..plots import CURVES, MEMBER, Quantity, paper_style
 from ..site.water_table import draw_water_table, level_line, top_with_water, water_legend
 from ..water.seepage_plots import FlowPicture, few, flow_picture, save_flow
 from .flow import StageFlow
+from .surface import surface_picture
 
 MOVED = Quantity("Displacement", "mm", scale=1e3, colours="viridis")
 SHEAR = Quantity("Accumulated deviatoric strain", "%", scale=1e2, colours="inferno")
@@ -127,7 +128,7 @@ def save_over_stages(path: Path, names: Sequence[str], curves: dict[str, Sequenc
 def stage_pictures(
     stages: Sequence[bridge.Stage], rows: list[dict], pictures: list[StagePicture], folder: Path
 ) -> Pictures:
-    """The soil after each stage by displacement and by strain, and movements over the stages.
+    """The soil after each stage by displacement and by strain, settlements of level ground, and movements over the stages.
 
     Stages before displacements were reset, such as the one that makes the stresses in situ, are left out.
     """
@@ -142,6 +143,7 @@ def stage_pictures(
         **flowing,
         "stages_displacement": lambda: save_stages(folder / "stages_displacement.png", pictures, MOVED),
         "stages_strain": lambda: save_stages(folder / "stages_strain.png", pictures, SHEAR),
+        **surface_picture(pictures, folder),
         "movements": movement_picture(rows, folder),
     }
 

@@ -24,7 +24,8 @@ from ..site.options import add_site_file
 from ..solids.member_forces import force_picture
 from ..solids.stages import solid_stage, solid_stage_pictures
 from .flow import flow_row, warn_of_heave
-from .plots import StageFiles, stage_picture, stage_pictures
+from .plots import StageFiles, first_shown, stage_picture, stage_pictures
+from .surface import surface_rows
 
 
 def add_stage_options(parser: ArgumentParser, site: str, elements: str) -> None:
@@ -46,6 +47,12 @@ class StageRun:
     pictures: list[Any] = field(default_factory=list)
     forces: list[StageForces] = field(default_factory=list)
     stopped: str | None = None
+
+    def add_surface(self, stages: Sequence[bridge.Stage]) -> None:
+        """Add the settlements of level ground to the rows, on the first rank, which has the pictures."""
+        if self.pictures and self.site.fem.domain.topology.dim == 2:
+            for row, more in zip(self.rows, surface_rows(self.pictures, first_shown(stages, self.rows))):
+                row |= more
 
     def drawn(self, stages: Sequence[bridge.Stage], folder: Path) -> Pictures:
         """Pictures of the stages and of the structural members."""

@@ -174,6 +174,7 @@ def test_a_lining_that_comes_after_deconfinement_carries_the_rest():
     [
         ({"excavate": "pit 1", "deconfinement": 40}, "stage 'a': deconfinement is 40, expected a fraction above 0 and up to 1"),
         ({"excavate": "pit 1", "deconfinement": 0.0}, "deconfinement is 0.0, expected a fraction"),
+        ({"excavate": "pit 1", "deconfinement": True}, "deconfinement is True, expected a fraction"),
         ({"excavate": "pit 1", "deconfinement": "half"}, "deconfinement is 'half', expected a fraction"),
         ({"excavate": "pit 1", "fill": "pit 3", "deconfinement": 0.4}, "fill: no cell has the name 'pit 3'"),
         ({"support": bridge.prescribed("floor", (None, -0.01)), "deconfinement": 0.4}, "prescribes displacements, of which only a part"),
