@@ -112,6 +112,7 @@ def main(arguments: list[str] | None = None) -> int:
         comparison(site, run.site)
         if a.compare
         and run.stopped is None
+        and site.stages[-1].deconfinement == 1
         and not (site.members or site.begins_at_rest or site.soils_with_strength_ratio)
         else {}
     )

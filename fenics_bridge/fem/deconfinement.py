@@ -27,14 +27,16 @@ def wrong_deconfinement(stage: Stage, where: str) -> str | None:
         return f"{where}deconfinement is {given!r}, expected a fraction above 0 and up to 1, such as 0.4"
     if given == 1:
         return None
-    part = f"{where}deconfinement is {given:g} in a stage that"
+    whole, members = "", stage.install if isinstance(stage.install, dict) else {}
+    stressed = next((name for name, member in members.items() if getattr(member, "prestress", 0)), None)
     if stage.fill:
-        return f"{part} fills {list(stage.fill)}, only a part of whose weight would act, expected fill in a stage of its own"
-    if any(value for support in stage.support for value in support.displacement or ()):
-        return (
-            f"{part} prescribes displacements, of which only a part would happen, expected them in a stage of their own"
-        )
-    return None
+        whole = f"fills {list(stage.fill)}, only a part of whose weight would act"
+    elif any(value for support in stage.support for value in support.displacement or ()):
+        whole = "prescribes displacements, only a part of which would happen"
+    elif stressed is not None:
+        whole = f"installs {stressed!r} with a prestress, only a part of which would act on the ground"
+    expected = "expected that in a stage of its own"
+    return f"{where}deconfinement is {given:g} in a stage that {whole}, {expected}" if whole else None
 
 
 def reached_by(stage: Stage, now: Load, load: Load, state: SiteState) -> Load:

@@ -177,7 +177,9 @@ def test_a_lining_that_comes_after_deconfinement_carries_the_rest():
         ({"excavate": "pit 1", "deconfinement": True}, "deconfinement is True, expected a fraction"),
         ({"excavate": "pit 1", "deconfinement": "half"}, "deconfinement is 'half', expected a fraction"),
         ({"excavate": "pit 1", "fill": "pit 3", "deconfinement": 0.4}, "fill: no cell has the name 'pit 3'"),
-        ({"support": bridge.prescribed("floor", (None, -0.01)), "deconfinement": 0.4}, "prescribes displacements, of which only a part"),
+        ({"install": {"tie": mpm.strut((3.0, 2.0), (8.0, 2.0), 1e8, prestress=1e4)}, "deconfinement": 0.4}, "installs 'tie' with a prestress"),
+        ({"install": ["tie"], "deconfinement": 0.4}, "install is .*'tie'"),
+        ({"support": bridge.prescribed("floor", (None, -0.01)), "deconfinement": 0.4}, "prescribes displacements, only a part"),
     ],
 )  # fmt: skip
 def test_a_deconfinement_that_is_not_possible_is_named(pit, wrong, message):

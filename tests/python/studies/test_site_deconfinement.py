@@ -84,3 +84,12 @@ def test_a_deconfinement_that_is_no_fraction_is_named(tmp_path, value):
     path = written(tmp_path, f'{IN_SITU}[[stages]]\nname = "core"\nexcavate = "core"\ndeconfinement = {value}\n')
     said = ended("excavation", tmp_path / "out", "--site", path, "--elements", "P1").stderr
     assert "stage 'core': deconfinement is" in said and "expected a fraction above 0 and up to 1" in said
+
+
+def test_soil_placed_at_once_is_no_comparison_for_stages_that_leave_forces_held(tmp_path):
+    text = (MESHES / "excavation.toml").read_text().replace('"excavation.geo"', f'"{MESHES}/excavation.geo"')
+    (tmp_path / "site.toml").write_text(text + "deconfinement = 0.5\n")
+    with pytest.warns(RuntimeWarning, match="has deconfinement = 0.5"):
+        excavation.main(["--site", str(tmp_path / "site.toml"), "--elements", "P1", "--output", str(tmp_path / "out")])
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["finished_run"] and "difference_to_at_once" not in summary
