@@ -46,6 +46,7 @@ Mesh.MeshSizeFromPoints = 0;
 Physical Surface("ground") = {2};
 Physical Surface("core") = {1};
 Physical Curve("axis") = {3, 7, 8};
+Physical Curve("wall") = {1, 2};
 Physical Curve("base") = {4};
 Physical Curve("right") = {5};
 Physical Curve("surface") = {6};
