@@ -88,6 +88,8 @@ def carry_out(site: Site, degree: int, folder: Path, comm: MPI.Comm, **options: 
             run.forces.append(stage_forces(run.site, report.name))
             run.rows.append({**movements(run.site), "stage": report.name, "steps": report.steps, "iterations": report.iterations,
                              "largest_displacement_m": report.largest_displacement, **flow_row(run.site.state.pore_pressure), **force_row(run.site.fem.members, run.forces[-1].forces)})  # fmt: skip
+            if stage.deconfinement < 1:
+                run.rows[-1]["deconfinement"] = stage.deconfinement
             warn_of_heave(run.rows[-1], [run.site.state.unit_weight[tag] for tag in run.site.state.there])
             picture = (stage_picture if site.dimension == 2 else solid_stage)(run.site, report.name)
             if picture is not None:

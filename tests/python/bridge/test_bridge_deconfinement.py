@@ -260,3 +260,21 @@ def test_a_stage_that_fails_after_one_that_held_names_the_part_of_what_was_left(
     held = site.fem.load.held
     assert particles.take_over(site).unbalanced_ratio > 1e-3
     assert site.fem.load.held == held and not site.fem.converged
+
+
+def test_undrained_strength_follows_the_stress_under_the_forces_that_are_held(column):
+    """Of 2 m of 16 kN/m3 that are dug away half is held: 0.3 (16 + 18 + 20 d) kPa at a depth of d in the ground."""
+    soils, least = SOILS["column"], 1e3
+    clay = mpm.Heterogeneous(mpm.tresca(young=20e6, poisson=0.4, shear_strength=least), ["cohesion"])
+    site = site_of(column, elastic(soils), degree=2)
+    ratio = {"ground": bridge.StrengthRatio(0.3)}
+    load = site.place([
+        bridge.Stage("all", fill=soils, unit_weight=weights(soils)),
+        bridge.Stage("dig", excavate="layer 2", deconfinement=0.5),
+        bridge.Stage("undrained", law={"ground": clay}, strength_ratio=ratio),
+    ])  # fmt: skip
+    points = site.fem.points
+    height = points.coordinates()[:, 1]
+    rows = height < 3
+    expected = 0.3 * (0.5 * 32e3 + 18e3 + 20e3 * (3 - height[rows]))
+    assert load.held == 0 and np.allclose(points.state[rows, -1] + least, expected, rtol=1e-9)

@@ -54,6 +54,7 @@ def test_the_study_of_a_tunnel_says_its_volume_loss(tmp_path, capsys):
     assert code == 0 and 0.005 < last["volume_loss"] < 0.02
     assert f"volume loss {last['volume_loss']:.2%}" in capsys.readouterr().out
     assert "volume_loss" not in summary["stages"][0]
+    assert [stage.get("deconfinement") for stage in summary["stages"]] == [None, 0.5, None]
 
 
 def test_a_pit_has_settlements_beside_it_and_no_volume_loss(tmp_path):
