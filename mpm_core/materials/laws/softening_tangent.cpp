@@ -64,8 +64,7 @@ void write_softening_tangent(const SofteningPoint& point, const Frame<D>& frame,
   const Returned returned = return_to_surface(m, point.trial);
   const Matrix3 map = region_map(m, returned.region);
   write_tangent<D>(m, map, {point.trial, frame}, returned, tangent);
-  add_softening<D>(point, m, map, frame, returned.stress, increment,
-                   tangent);
+  add_softening<D>(point, m, map, frame, returned.stress, increment, tangent);
 }
 
 template void write_softening_tangent<2>(const SofteningPoint&, const Frame<2>&, double, double*);

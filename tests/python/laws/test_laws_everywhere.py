@@ -30,7 +30,12 @@ SMALL_STRAIN = mpm.HardeningSoil(
     | {"small_strain_modulus": 100e6, "threshold_strain": 1e-4}
 )
 ROCK = mpm.HoekBrown(
-    young=20e6, poisson=0.3, intact_strength=1e6, geological_strength_index=20.0, intact_constant=4.0, dilation_ratio=0.2
+    young=20e6,
+    poisson=0.3,
+    intact_strength=1e6,
+    geological_strength_index=20.0,
+    intact_constant=4.0,
+    dilation_ratio=0.2,
 )
 LAWS = {
     "elastic": mpm.LinearElastic(**ELASTIC),
