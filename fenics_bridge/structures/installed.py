@@ -20,6 +20,9 @@ from fenics_bridge.structures.line_nodes import runs_beside, shared_nodes
 from fenics_bridge.structures.unknowns import Unknowns
 from mpm_core import _core
 
+LEAST_SIDES = 6
+"""Sides from which on a line is a polygon that stands for a curve"""
+
 
 @dataclass
 class _Installed:
@@ -41,6 +44,8 @@ class _Installed:
     """Matrix of the strains by the unknowns of the body (k, unknowns)"""
     beside: bool = False
     """Whether it goes along edges of the mesh, and has other nodes than these"""
+    per_side: int = 1
+    """Segments of each side, of a polygon of which each side is one edge of the mesh"""
 
     def stiffness(self) -> NDArray[np.float64]:
         """Elastic stiffness of each strain: (k,)."""
@@ -241,7 +246,9 @@ class Members:
             moment[list(at)] = value
         moved = self._moved(one, displacement) - one.origin
         hoops = [one.force[rows].copy() for rows in strains.of_hoops] if strains.hoops else (None, None)
-        return MemberForces(one.nodes, moved, one.force[: strains.segments].copy(), moment, *hoops)
+        return MemberForces(
+            one.nodes, moved, one.force[: strains.segments].copy(), moment, *hoops, per_side=one.per_side
+        )
 
     def moved(self, name: str, displacement: NDArray[np.float64]) -> Any:
         """Displacements of a member's nodes, those of the soil before its installation among them (n, D) [m]. Collective.
@@ -264,7 +271,12 @@ class Members:
         nodes = member.nodes(size / min(2, degree) or member.length) if shared is None else shared
         strains = member.strains(nodes, self._of_revolution)
         beside = bends_freely and shared is None and runs_beside(self._space.mesh, np.array(member.points), size)
-        one = _Installed(member, nodes, strains, np.zeros(0), None, member.prestress != 0, beside=beside)
+        sides = len(member.points) - 1
+        is_polygon = shared is not None and sides >= LEAST_SIDES and strains.segments == degree * sides
+        per_side = degree if is_polygon else 1
+        one = _Installed(
+            member, nodes, strains, np.zeros(0), None, member.prestress != 0, beside=beside, per_side=per_side
+        )
         one.force = one.unstrained()
         return one
 

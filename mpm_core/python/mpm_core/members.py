@@ -287,6 +287,8 @@ class MemberForces:
     """In axial symmetry, hoop force of each segment [N/m], tension positive, shape (n - 1,)"""
     hoop_moment: NDArray[np.float64] | None = None
     """In axial symmetry, hoop moment of each segment [N m/m], with the sign of the moment, shape (n - 1,)"""
+    per_side: int = 1
+    """Segments of each side, of a polygon of which each side is one edge of quadratic or quartic elements; otherwise 1"""
 
     @property
     def places(self) -> NDArray[np.float64]:
@@ -300,11 +302,16 @@ class MemberForces:
 
     @property
     def shear_force(self) -> NDArray[np.float64]:
-        """Shear force of each segment, the change of the moment along it [N/m], shape (n - 1,); with the hoop moment in a shell."""
+        """Shear force of each segment, the change of the moment along it [N/m], shape (n - 1,); with the hoop moment in a shell.
+
+        Segments of a polygon of `per_side` have the mean of their side: its ends turn and its middle bears most of the pressure, so that
+        the shear force goes up and down within a side by more than it has along a circle.
+        """
         edges = np.diff(self.positions, axis=0)
         lengths = np.linalg.norm(edges, axis=1)
         if self.hoop_moment is None:
-            return np.diff(self.moment) / lengths
+            of_sides = np.diff(self.moment[:: self.per_side]) / lengths.reshape(-1, self.per_side).sum(axis=1)
+            return np.repeat(of_sides, self.per_side)
         radius = self.positions[:, 0]
         change = np.diff(radius * self.moment) - edges[:, 0] * self.hoop_moment
         return change / (lengths * (radius[1:] + radius[:-1]) / 2)

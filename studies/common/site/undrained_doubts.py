@@ -11,8 +11,12 @@ LEAST_SHARE = 0.9
 
 
 def skempton(law: mpm.Undrained) -> float | None:
-    """Skempton's B of a law whose water does not drain, K_w / n over K_w / n + K [-]; None where the skeleton has no Young's modulus."""
-    young, poisson = (getattr(law.skeleton, name, None) for name in ("young", "poisson"))
+    """Skempton's B of a law whose water does not drain, K_w / n over K_w / n + K [-]; None where the skeleton has no Young's modulus.
+
+    Of HardeningSoil it is that of unloading at the reference pressure.
+    """
+    young = getattr(law.skeleton, "young", getattr(law.skeleton, "unloading_modulus", None))
+    poisson = getattr(law.skeleton, "poisson", None)
     if young is None or poisson is None:
         return None
     water = law.water_modulus / law.porosity

@@ -1,5 +1,7 @@
 """Nodes of beams along lines of the mesh: those of the soil, so that shear forces are those of equilibrium."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -11,6 +13,7 @@ from fenics_bridge.structures.line_nodes import shared_nodes
 LEFT, RIGHT, BOTTOM, TOP = 1, 2, 3, 4
 LENGTH = 4.0
 CELLS = 12
+MESHES = Path(__file__).parents[3] / "meshes"
 
 
 def stretched():
@@ -123,3 +126,26 @@ def test_a_beam_across_cells_goes_along_no_edges(recwarn):
     fem = bridge.QuasiStatic(domain, soil, facet_tags, [bridge.fixed(BOTTOM)], degree=2, cell_tags=cell_tags)
     fem.reconfigure(members={"beam": mpm.beam([(0.1, 0.13), (3.7, 0.41)], 1e8, 1e6)})
     assert not [w for w in recwarn if "goes along edges" in str(w.message)]
+
+
+def test_the_shear_force_of_a_ring_is_the_mean_of_the_sides_of_its_polygon():
+    """A ring under uniform pressure has a thrust N alone. The sides of its polygon bend between their ends: the moment goes up and down by N s^2 / 12 R."""
+    arcs = 12
+    mesh = bridge.read_mesh(
+        MESHES / "cylinder.geo", MPI.COMM_SELF, parameters={"inner": 1.0, "outer": 2.0, "rings": 6, "arcs": arcs}
+    )
+    soil, supports = mpm.LinearElastic(young=50e6, poisson=0.3), [
+        bridge.roller("bottom", (0, 1)),
+        bridge.roller("left", (1, 0)),
+    ]
+    fem = bridge.QuasiStatic(mesh[0], soil, mesh[2], supports, degree=2)
+    angle = np.linspace(0, np.pi / 2, arcs + 1)
+    lining = mpm.beam(np.column_stack([np.cos(angle), np.sin(angle)]), 1e9, 1e6, clamped_start=True, clamped_end=True)
+    fem.reconfigure(members={"lining": lining})
+    fem.solve(bridge.Load(pressure={"outer": 100e3}))
+    forces = fem.member_forces("lining")
+    thrust, side = -forces.axial_force.mean(), 2 * np.sin(np.pi / 4 / arcs)
+    assert forces.per_side == 2 and len(forces.positions) == 2 * arcs + 1
+    within = np.diff(forces.moment) / (side / 2)
+    assert np.allclose(np.abs(within), thrust * side / 3, rtol=0.05)
+    assert np.abs(forces.shear_force).max() < 0.02 * np.abs(within).max()

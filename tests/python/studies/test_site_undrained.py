@@ -42,6 +42,14 @@ def test_water_that_leaves_the_skeleton_much_of_a_load_is_said(tmp_path, place, 
         assert "water_modulus is 2e+07 Pa" in texts[0] and "4.17e+07 Pa" in texts[0]
 
 
+def test_hardening_soil_counts_with_its_modulus_of_unloading():
+    soil = mpm.HardeningSoil(
+        secant_modulus=20e6, oedometer_modulus=20e6, unloading_modulus=60e6, cohesion=1e3, friction_angle=30.0
+    )
+    law = mpm.Undrained(soil, water_modulus=2e7, porosity=0.5)
+    assert skempton(law) == pytest.approx(40 / (40 + 60 / (3 * (1 - 2 * 0.2))))
+
+
 def test_a_skeleton_without_a_modulus_is_not_doubted():
     assert skempton(mpm.Undrained(mpm.CamClay(poisson=0.3, compression=0.1, swelling=0.02, critical_slope=1.0, void_ratio=1.0,
                                               preconsolidation=50e3, attraction=1e3), water_modulus=2e7, porosity=0.5)) is None  # fmt: skip
