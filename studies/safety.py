@@ -25,6 +25,7 @@ from common.ranks import run_study
 from common.results import open_results
 from common.site.file import Site
 from common.site.k0 import all_at_rest, begin_at_rest, say_left_out
+from common.site.names import mistakes_in, require_soils
 from common.site.runs import add_site_option, check_site_options, site_study
 from common.site.slides import IN_TETRAHEDRON
 from common.slope.case import GRAVITY, SUPPORTS, soil_of
@@ -311,6 +312,7 @@ def main(arguments: list[str] | None = None) -> int:
     if a.site is not None:
 
         def require(site):
+            require_soils(a.unreduced, site.soils, f"--unreduced, {a.site}")
             if site.axisymmetric and (a.seismic_coefficient or a.critical_seismic):
                 given = (
                     f"--seismic-coefficient is {a.seismic_coefficient:g}"
@@ -326,7 +328,8 @@ def main(arguments: list[str] | None = None) -> int:
         def factor(site, model, progress):
             unreduced = site.tags_of(a.unreduced)
             warn_of_undrained_weight(site)
-            load = shaken(site_load(site, model), a.seismic_coefficient, model.domain.geometry.dim)
+            with mistakes_in(a.site):
+                load = shaken(site_load(site, model), a.seismic_coefficient, model.domain.geometry.dim)
             return bridge.factor_of_safety(model, load, start=a.start, progress=progress, unreduced=unreduced)
 
         def more(site):

@@ -66,6 +66,7 @@ from .laws import (
 )
 from .law_doubts import DOUBTS
 from .mesh import check_soils, geometry_of, site_mesh
+from .names import mistakes_in, require_soils
 from .stages import stage_of, warn_of_held
 from .strength import law_of_table, ratio_of, with_strength_ratios, without_history
 from .supports import supports_of, warn_of_rigid_core
@@ -81,6 +82,7 @@ class Site:
     random: parameters of soils that are random fields; k0: ratio of horizontal to vertical effective stress by soil, of those that have one
     overconsolidation: largest vertical effective stress before over that of the beginning by soil, of those that have one
     strength_ratio: undrained strength over vertical effective stress of the beginning by soil, of those that have one
+    path: of the file, for messages
     """
 
     domain: Any
@@ -99,6 +101,7 @@ class Site:
     k0: dict[str, float] = field(default_factory=dict)
     overconsolidation: dict[str, float] = field(default_factory=dict)
     strength_ratio: dict[str, bridge.StrengthRatio] = field(default_factory=dict)
+    path: Path = Path()
 
     @property
     def dimension(self) -> int:
@@ -145,7 +148,8 @@ class Site:
         )
         self.vary(fem, laws or self.laws)
         if self.members and not self.stages and not self.begins_at_rest:
-            fem.reconfigure(members=self.members)
+            with mistakes_in(self.path):
+                fem.reconfigure(members=self.members)
         return fem
 
     def vary(self, fem: bridge.QuasiStatic, laws: dict[int, Any]) -> None:
@@ -216,9 +220,7 @@ class Site:
         Raises:
             InputError: a soil is not one of the site's.
         """
-        for soil in soils:
-            if soil not in self.soils:
-                raise mpm.InputError(f"soil {soil!r} is not among the soils {', '.join(self.soils)}")
+        require_soils(soils, self.soils, str(self.path))
         names = bridge.names_of(self.cell_tags)
         return [tag for soil in soils for tag in names.get(soil, (soil,))]
 
@@ -268,6 +270,7 @@ def site_of(
     k0, ratios = k0_of(soils, path), overconsolidation_of(soils, path)
     weak = {soil: ratio for soil, given in soils.items() if (ratio := ratio_of(given, f"{path}: soils.{soil}"))}
     random: list[SoilField] = []
+    classes = _classes(table, path)
     for soil, given in soils.items():
         where = f"{path}: soils.{soil}"
         weights[soil] = unit_weight_of(given, where)
@@ -278,9 +281,7 @@ def site_of(
         if not set(parameters) - {"porosity"}:
             raise mpm.InputError(f"{where} has no law, which this study needs: material, and the parameters of the law")
         if any(isinstance(value, dict) for value in parameters.values()):
-            cell_tags, heights = bridge.graded_tags(
-                domain, cell_tags, soil, lambda x: x[:, -1], table.get("classes", 20)
-            )
+            cell_tags, heights = bridge.graded_tags(domain, cell_tags, soil, lambda x: x[:, -1], classes)
             own = {tag: law_of_table(parameters, height, where, fields) for tag, height in heights.items()}
         else:
             law = law_of_table(parameters, None, where, fields)
@@ -311,7 +312,7 @@ def site_of(
     at_once = interfaces or (interfaces is None and not rows)
     laws = weakened(laws, beside, at_once)
     site = Site(domain, cell_tags, facet_tags, list(soils), laws, weights, supports_of(table, path, domain, facet_tags), [],
-                list(others.values()), axisymmetric, rows, members, random, k0, ratios, weak)  # fmt: skip
+                list(others.values()), axisymmetric, rows, members, random, k0, ratios, weak, path)  # fmt: skip
     site.stages = [stage_of(given, k, site, others, path) for k, given in enumerate(rows)]
     warn_of_held(site.stages, path)
     if beside.walls and not at_once:
@@ -339,6 +340,14 @@ def site_of(
     if beside.walls:
         site.stages = with_ratios_beside(site.stages, site.laws, beside, lambda soil: site.tags_of([soil]))
     return site
+
+
+def _classes(table: Mapping[str, Any], path: Path) -> int:
+    """Number of steps of parameters that grow with depth; path: of the file, for the error."""
+    classes = table.get("classes", 20)
+    if not isinstance(classes, int) or isinstance(classes, bool) or classes < 1:
+        raise mpm.InputError(f"{path}: classes is {classes!r}, expected a whole number from 1 on")
+    return classes
 
 
 def _require_dimension(members: Mapping[str, mpm.Member], dim: int, path: Path) -> None:

@@ -11,6 +11,7 @@ from fenics_bridge import water
 
 from .doubts import warn_of_flow, warn_of_rate
 from .keys import CONDITIONS, CURVES, DAY, FLOW, UNDRAINED, part_of
+from .laws import is_number
 
 
 def wet_soils(table: dict[str, Any], path: Path, keys: Collection[str] = FLOW) -> dict[str, water.PorousSoil | None]:
@@ -63,10 +64,10 @@ def porous_soil(given: dict, where: str) -> water.PorousSoil:
 
 
 def _has_numbers(value: Any) -> bool:
-    """Whether a value of a site file, or whatever is in its lists and tables, is a number."""
+    """Whether a value of a site file, or whatever is in its lists and tables, is a finite number."""
     if isinstance(value, (list, dict)):
         return all(_has_numbers(part) for part in (value.values() if isinstance(value, dict) else value))
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    return is_number(value)
 
 
 def _of_strata(conductivity: Any, dip: float) -> Any:
@@ -95,7 +96,7 @@ def condition(name: str, given: dict, where: str) -> Any:
         _require_rain(where, key, [number for _, number in value])
         warn_of_rate(key, max(number for _, number in value), where)
         return make(name, tuple((DAY * float(day), unit * float(number)) for day, number in value))
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
+    if not is_number(value):
         raise mpm.InputError(f"{where}: {key} is {value!r}, expected a number or rows [days, value]")
     _require_rain(where, key, [value])
     warn_of_rate(key, value, where)

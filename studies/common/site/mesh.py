@@ -13,7 +13,9 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 from ..checks import say
+from .laws import is_number
 from .keys import read_site_table
+from .names import names_at, require_boundaries
 
 AIR = ("air", "water", "empty")
 """Groups of a mesh that hold no soil by their names"""
@@ -50,7 +52,7 @@ def require_plane(table: dict[str, Any], path: Path) -> None:
 def site_mesh(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None) -> tuple[Any, Any, Any]:
     """The mesh that the table of a site's file names, cell tags and facet tags; `cell_size` [m] instead of the one there."""
     size = table.get("cell_size") if cell_size is None else cell_size
-    constants = table.get("constants", {}) | ({} if size is None else {"cell_size": size})
+    constants = _constants(table, path) | ({} if size is None else {"cell_size": size})
     mesh = path.parent / str(table["mesh"])
     try:
         domain, cell_tags, facet_tags = bridge.read_mesh(mesh, comm, dimension_of(table, path), parameters=constants)
@@ -61,7 +63,19 @@ def site_mesh(table: dict, path: Path, comm: MPI.Comm, cell_size: float | None) 
         raise mpm.InputError(f"{path}: mesh: {text}") from None
     if geometry_of(table, path) is not None:
         _require_radii(domain, path)
+    require_boundaries(table, path, facet_tags)
     return domain, cell_tags, facet_tags
+
+
+def _constants(table: dict[str, Any], path: Path) -> dict[str, float]:
+    """Constants of the .geo file that the table of a site gives; path: of the file, for the error."""
+    given = table.get("constants", {})
+    if not isinstance(given, dict):
+        raise mpm.InputError(f"{path}: constants is {given!r}, expected a table such as constants = {{width = 8.0}}")
+    for name, value in given.items():
+        if not is_number(value):
+            raise mpm.InputError(f"{path}: constants.{name} is {value!r}, expected a number")
+    return dict(given)
 
 
 def _require_radii(domain: Any, path: Path) -> None:
@@ -89,8 +103,7 @@ def check_soils(table: dict, path: Path, cell_tags: Any) -> None:
             raise mpm.InputError(
                 f"{path}: soils.{soil}: no cell has the name {soil!r}; the mesh has {', '.join(map(repr, names))}"
             )
-    declared = table.get("air", [])
-    named = {*table["soils"], *AIR, *([declared] if isinstance(declared, str) else declared)}
+    named = {*table["soils"], *AIR, *names_at(table, "air", str(path), "groups of the mesh")}
     left = [name for name in bridge.names_of(cell_tags) if name not in named]
     if left:
         groups = ", ".join(map(repr, left))

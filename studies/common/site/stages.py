@@ -15,6 +15,7 @@ from ..checks import say
 from .doubts import warn_of_depth, warn_of_dry_level, warn_of_slanting_water
 from .keys import require_push
 from .laws import is_number
+from .names import names_at, require_soils
 from .supports import support_of
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def stage_of(given: Mapping[str, Any], number: int, site: Site, laws: Mapping[st
         InputError: a value that is not possible, or a soil, law or member that the site does not have.
     """
     where = f"{path}: stages[{number}]"
-    for key in ("law", "unit_weight", "pressure", "support"):
+    for key in ("law", "unit_weight"):
         if not isinstance(given.get(key, {}), dict):
             raise mpm.InputError(f"{where}: {key} is {given[key]!r}, expected a table such as {key} = {{name = value}}")
     for name, pressure in given.get("pressure", {}).items():
@@ -44,11 +45,15 @@ def stage_of(given: Mapping[str, Any], number: int, site: Site, laws: Mapping[st
     reset = given.get("reset_displacement", False)
     if not isinstance(reset, bool):
         raise mpm.InputError(f"{where}: reset_displacement is {reset!r}, expected true or false")
-    fill = given.get("fill", [])
-    fill = [fill] if isinstance(fill, str) else fill
-    for soil in [*fill, *given.get("law", {})]:
-        if soil not in site.unit_weight:
-            raise mpm.InputError(f"{where}: soil {soil!r} is not among the soils {', '.join(site.unit_weight)}")
+    fill, excavate = (names_at(given, key, where, "soils") for key in ("fill", "excavate"))
+    by_soil = {
+        "fill": fill,
+        "excavate": excavate,
+        "law": given.get("law", {}),
+        "unit_weight": given.get("unit_weight", {}),
+    }
+    for key, soils in by_soil.items():
+        require_soils(soils, site.unit_weight, f"{where}: {key}")
     install, remove = (_member_names(given, key, site, where) for key in ("install", "remove"))
     for soil, law in given.get("law", {}).items():
         if law not in laws:
@@ -58,13 +63,13 @@ def stage_of(given: Mapping[str, Any], number: int, site: Site, laws: Mapping[st
     return bridge.Stage(
         str(given.get("name", f"stage {number + 1}")),
         fill=fill,
-        excavate=given.get("excavate", ()),
+        excavate=excavate,
         law={soil: laws[law] for soil, law in given.get("law", {}).items()},
         unit_weight={**{soil: site.unit_weight[soil] for soil in fill}, **given.get("unit_weight", {})},
         pressure=given.get("pressure", {}),
         support=[support_of(name, kind, f"{where}.support.{name}", site.domain, site.facet_tags)
                  for name, kind in given.get("support", {}).items()],
-        release=given.get("release", ()),
+        release=names_at(given, "release", where, "boundaries"),
         pore_pressure=_water(given["water_level"], where, site) if "water_level" in given else None,
         reset_displacement=reset,
         install={name: site.members[name] for name in install},
@@ -83,10 +88,7 @@ def warn_of_held(stages: Sequence[bridge.Stage], path: Path) -> None:
 
 def _member_names(given: Mapping[str, Any], key: str, site: Site, where: str) -> list[str]:
     """Names of structural members that a stage installs or removes."""
-    names = given.get(key, [])
-    names = [names] if isinstance(names, str) else names
-    if not isinstance(names, list):
-        raise mpm.InputError(f"{where}: {key} is {names!r}, expected names of members")
+    names = names_at(given, key, where, "members")
     for name in names:
         if name not in site.members:
             known = ", ".join(site.members) or "there is none"

@@ -20,6 +20,7 @@ from ..figures import Pictures
 from ..quiet import NOT_REACHED, without_warning
 from ..site.file import Site
 from ..site.member_results import StageForces, force_row, member_pictures, stage_forces, write_members
+from ..site.names import mistakes_in
 from ..site.options import add_site_file
 from ..solids.member_forces import force_picture
 from ..solids.stages import solid_stage, solid_stage_pictures
@@ -76,7 +77,8 @@ def carry_out(site: Site, degree: int, folder: Path, comm: MPI.Comm, **options: 
         InputError: before the first stage, for one that cannot follow those before it.
     """
     run = StageRun(bridge.FemSite(site.finite_elements(degree, **options)))
-    require_stages(run.site, site.stages)
+    with mistakes_in(site.path):
+        require_stages(run.site, site.stages)
     with StageFiles(run.site, folder / "stages", comm) as files:
         for stage in site.stages:
             try:

@@ -104,7 +104,7 @@ def test_a_head_beside_soil_without_water_is_named(tmp_path):
     [
         ("steady_flow = true", "steady_flow = 1", r"stages\[0\]: steady_flow is 1, expected true or false"),
         ("steady_flow = true", "steady_flow = true\nwater_level = 2.0", r"stages\[0\] has steady_flow and water_level"),
-        ("head = 23.0", "head = 23.0\n[boundaries.wall]\nhead = 3.0", r"stages\[0\]: steady_flow: .*'wall'"),
+        ("head = 23.0", "head = 23.0\n[boundaries.wall]\nhead = 3.0", r"boundaries.wall: no boundary of the mesh .* has the name 'wall'"),
         ("conductivity = 1e-4", "", r"stages\[0\]: steady_flow is true, but no soil with a conductivity is there"),
         (
             "[boundaries.right]  # the groundwater far from the pit\nhead = 23.0",
