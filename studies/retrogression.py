@@ -33,7 +33,7 @@ from common.ranks import run_study
 from common.results import open_results
 from common.schemes import add_pic
 from common.site.laws import unit_doubt
-from common.slope.case import SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem
+from common.slope.case import SlopeCase, add_slope_options, build_slope, check_slope_options, soil_fem, why_ended
 from common.soils import given_law, law_of
 from common.summary import write_summary
 from mpi4py import MPI
@@ -176,11 +176,7 @@ def slide(args: Namespace, size: float, folder: Path, interrupt: Interrupt) -> S
                 if result.at_rest or result.stopped:
                     break
         except mpm.RunError as error:
-            result.stopped = str(error)
-            if "left the background mesh" in result.stopped:
-                result.stopped += (
-                    f"; what leaves it beyond the toe needs more --runout-length than {a.runout_length:g} m"
-                )
+            result.stopped = why_ended(error, a)
     return result
 
 

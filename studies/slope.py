@@ -42,7 +42,15 @@ from common.schemes import (
 from common.site.laws import unit_doubt
 from common.site.runs import add_site_option, check_site_options
 from common.site.slides import add_strength_factor, site_slide
-from common.slope.case import GRAVITY, SlopeCase, add_slope_options, build_slope, check_slope_options, initialise
+from common.slope.case import (
+    GRAVITY,
+    SlopeCase,
+    add_slope_options,
+    build_slope,
+    check_slope_options,
+    initialise,
+    why_ended,
+)
 from common.slope.results import drawn, page, print_summary, start_line, summarised
 from common.soils import check_law_options, law_of
 from common.summary import write_summary
@@ -263,7 +271,7 @@ def slide(
                     break
                 started = perf_counter()
         except mpm.RunError as error:
-            loop["stopped"] = str(error)
+            loop["stopped"] = why_ended(error, a)
             report = model.report()
     return {**loop, "report": report, "particle_steps": report.particle_steps - done_before}
 

@@ -43,6 +43,8 @@ def add_slope_options(parser: argparse.ArgumentParser, **law: str | float | None
     add_geometry_options(slope, "a tenth")
     add_number(slope, "--runout-length", None, "m", "length of the background mesh beyond the toe (default: twice the height)",
                above=0)  # fmt: skip
+    add_number(slope, "--headroom", None, "m", "height of the background mesh above the crest, where soil may bulge (default: one cell)",
+               at_least=0)  # fmt: skip
     add_particles_per_cell(slope, 10)
     add_number(slope, "--unit-weight", 80e3, "N/m3", "unit weight of the soil", above=0)
     add_soil_options(slope, dilation_angle=0.0)
@@ -95,7 +97,8 @@ def _check_mesh(parser: argparse.ArgumentParser, options: argparse.Namespace) ->
     """Choose the kind of mesh, and end with an error where the kind or the number of cells does not fit the slope."""
     height, crest, size, angle = options.height, options.crest, options.cell_size, options.angle
     length = crest + height / math.tan(math.radians(angle)) + getattr(options, "runout_length", 0.0)
-    cells = 4 * length * (height + size) / size**2
+    headroom = getattr(options, "headroom", None)
+    cells = 4 * length * (height + (size if headroom is None else headroom)) / size**2
     check_cells(parser, options, cells, "--cell-size", "--height", "--angle", "--crest")
     kinds = {"crossed": angle in (45, 90), "fitted": 11.4 <= angle <= 78.6 or angle == 90, "gmsh": True}
     options.mesh = options.mesh or next(kind for kind, suits in kinds.items() if suits)
@@ -170,6 +173,7 @@ def build_slope(args: argparse.Namespace, comm: MPI.Comm) -> SlopeCase:
         cell_size=args.cell_size,
         kind=args.mesh,
         runout=args.runout_length,
+        headroom=args.headroom,
     )
     model = mpm.Model(bridge.background_mesh(domain, cell_tags, facet_tags), soil)
     model.seed(density=args.unit_weight / GRAVITY, per_cell=args.particles_per_cell, cell_tag=bridge.SOIL)
@@ -177,6 +181,18 @@ def build_slope(args: argparse.Namespace, comm: MPI.Comm) -> SlopeCase:
     model.fix(bridge.BASE)
     model.set_gravity((0.0, -GRAVITY))
     return SlopeCase(args, domain, cell_tags, facet_tags, soil, model)
+
+
+def why_ended(error: mpm.RunError, args: argparse.Namespace) -> str:
+    """Why a slide ended early: the text of its error, and the options of a longer or higher mesh where soil has left it."""
+    text = str(error)
+    if "left the background mesh" not in text:
+        return text
+    headroom = args.cell_size if args.headroom is None else args.headroom
+    return (
+        f"{text}; what leaves it beyond the toe needs more --runout-length than {args.runout_length:g} m, what leaves it at its top "
+        f"more --headroom than {headroom:g} m"
+    )
 
 
 def initialise(case: SlopeCase, kind: str, unit_weight: float, nmd: bool = False) -> dict[str, float]:

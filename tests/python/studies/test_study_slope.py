@@ -218,6 +218,23 @@ def test_a_background_mesh_that_is_too_short_ends_the_run_with_the_place_and_kee
     assert len(history(tmp_path)["time_s"]) > 1 and (tmp_path / "figure_4_shear_strain.png").exists()
 
 
+@pytest.mark.usefixtures("without_pictures")
+def test_soil_that_rises_above_the_mesh_needs_headroom(tmp_path):
+    """Ground under 18 kN/m3 that weighs 4 kN/m3 from now on rises by (18 - 4) H^2 / (2 M) = 0.024 m (M = 297 kPa, H = 1 m), and twice that
+    before it comes to rest: a quarter to a half of the cell of 0.1 m that the mesh has above the crest by default."""
+    rising = ["--initial-unit-weight", "18e3", "--unit-weight", "4e3", "--time", "0.2", "--frames", "2"]
+    result = slope(tmp_path / "without", *rising, "--headroom", "0")
+    assert result.returncode == 1
+    assert (
+        "left the background mesh" in result.stderr and "leaves it at its top more --headroom than 0 m" in result.stderr
+    )
+    assert slope(tmp_path / "with", *rising).returncode == 0
+    case_module = importlib.import_module("common.slope.case")
+    for more, height in ([], 1.1), (["--headroom", "0.45"], 1.5):  # by whole cells
+        case = case_module.build_slope(case_module.slope_options([*more]), MPI.COMM_SELF)
+        assert case.domain.geometry.x[:, 1].max() == pytest.approx(height)
+
+
 def test_ctrl_c_ends_cleanly(tmp_path):
     process = subprocess.Popen(command(tmp_path, "--time", "1000", "--frames", "4000"), stderr=subprocess.PIPE, text=True,
                                env={**os.environ})  # fmt: skip
