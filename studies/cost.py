@@ -5,7 +5,7 @@ stress. In the undrained case it starts from drained equilibrium under --initial
 applied too quickly for the water to drain; pore water makes the soil so stiff that the critical time step is smaller by two
 orders of magnitude. The explicit scheme has local damping; the others take quasi-static steps. Each run has a limit of
 processor time; if it is reached, the table gives a lower bound. Another table lists the force evaluations of every solver in
-one implicit step from zero stress. The study runs on one rank.
+one implicit step from zero stress. A run that fails keeps its row, with the reason. The study runs on one rank.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import process_time
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -89,8 +89,19 @@ class TimeUp(Exception):
     """The run has used up its processor time."""
 
 
-def limited(work: Callable[[], Any], limit: float) -> tuple[float, bool]:
-    """Processor time of some work [s], and whether it came to its end within a limit [s]."""
+class Spent(NamedTuple):
+    """How some work went.
+
+    seconds: processor time [s]; reached: whether it came to its end; failure: why it failed, None where it did not, or ran out of time
+    """
+
+    seconds: float
+    reached: bool
+    failure: str | None = None
+
+
+def limited(work: Callable[[], Any], limit: float) -> Spent:
+    """Do some work within a limit of processor time [s]."""
 
     def end(*_: object) -> None:
         raise TimeUp
@@ -100,9 +111,11 @@ def limited(work: Callable[[], Any], limit: float) -> tuple[float, bool]:
     signal.setitimer(signal.ITIMER_PROF, limit)
     try:
         work()
-        return process_time() - started, True
+        return Spent(process_time() - started, True)
     except TimeUp:
-        return process_time() - started, False
+        return Spent(process_time() - started, False)
+    except mpm.RunError as error:
+        return Spent(process_time() - started, False, str(error))
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
         signal.signal(signal.SIGPROF, before)
@@ -117,7 +130,11 @@ def prepared(a: Namespace, soil: str, stress: np.ndarray | None) -> SlopeCase:
 
 
 def initial_stress(a: Namespace, soil: str) -> np.ndarray | None:
-    """Stresses of drained equilibrium under the initial unit weight; none where the soil starts without stress."""
+    """Stresses of drained equilibrium under the initial unit weight; none where the soil starts without stress.
+
+    Raises:
+        InputError: the slope does not carry that weight.
+    """
     if soil == "drained":
         return None
     case = prepared(a, "drained", None)
@@ -137,19 +154,20 @@ def measured(a: Namespace, soil: str, name: str, stress: np.ndarray | None) -> d
     case = prepared(a, soil, stress)
     model, iterations = case.model, [0]
     if name == "explicit":
-        seconds, reached = limited(lambda: settled_explicitly(a, model), a.limit)
+        spent = limited(lambda: settled_explicitly(a, model), a.limit)
         iterations[0] = model.steps
     else:
         work = lambda: model.equilibrate(solver=SOLVERS[name](), tolerance=a.tolerance, max_steps=100)
         with counted(iterations):
-            seconds, reached = limited(work, a.limit)
+            spent = limited(work, a.limit)
     watched = case.crest_particle()
     particles = model.particles
     crest = float(np.linalg.norm(particles[particles.id == watched].displacement, axis=1).max())
     return {
         "soil": soil, "method": name, "cell_size_m": a.cell_size, "particles": len(particles),
-        "cells": len(particles) // a.particles_per_cell, "reached": reached, "cpu_seconds": seconds,
+        "cells": len(particles) // a.particles_per_cell, "reached": spent.reached, "cpu_seconds": spent.seconds,
         "force_evaluations": iterations[0], "out_of_balance_ratio": model.out_of_balance(), "crest_displacement_m": crest,
+        "failure": spent.failure,
     }  # fmt: skip
 
 
@@ -183,10 +201,10 @@ def one_step(a: Namespace, name: str, multiple: float) -> dict[str, object]:
     reports: list[Any] = []
     count = [0]
     with counted(count):
-        seconds, reached = limited(lambda: reports.extend(model.implicit(dt, dt=dt, solver=SOLVERS[name]())), a.limit)
+        spent = limited(lambda: reports.extend(model.implicit(dt, dt=dt, solver=SOLVERS[name]())), a.limit)
     return {
-        "method": name, "cell_size_m": a.cell_size, "step_over_critical": multiple, "reached": reached,
-        "force_evaluations": count[0], "steps": len(reports), "cpu_seconds": seconds,
+        "method": name, "cell_size_m": a.cell_size, "step_over_critical": multiple, "reached": spent.reached,
+        "force_evaluations": count[0], "steps": len(reports), "cpu_seconds": spent.seconds, "failure": spent.failure,
     }  # fmt: skip
 
 
@@ -201,7 +219,7 @@ def save_table(path: Path, rows: list[dict]) -> None:
 
 
 def save_costs(path: Path, rows: list[dict]) -> None:
-    """Time and work over the number of cells; hollow markers with an arrow are lower bounds."""
+    """Time and work over the number of cells; hollow markers with an arrow are lower bounds, and crosses runs that failed."""
     methods = list(dict.fromkeys(row["method"] for row in rows))
     quantities = {"Processor time [s]": lambda r: r["cpu_seconds"],
                   "Force evaluations × particles": lambda r: r["force_evaluations"] * r["particles"]}  # fmt: skip
@@ -211,11 +229,14 @@ def save_costs(path: Path, rows: list[dict]) -> None:
         for axes, (soil, (label, of)) in zip(panels.T.ravel(), [(s, q) for s in SOILS for q in quantities.items()]):
             for method, colour in zip(methods, CURVES):
                 mine = [row for row in rows if row["soil"] == soil and row["method"] == method]
-                cells, values = [row["cells"] for row in mine], [of(row) for row in mine]
-                axes.loglog(cells, values, color=colour, linewidth=1.1, label=method)
-                for row, x, y in zip(mine, cells, values):
-                    axes.plot(x, y, "o", color=colour, markersize=4, fillstyle="full" if row["reached"] else "none")
-                    if not row["reached"]:
+                drawn = [row for row in mine if not row["failure"]]
+                axes.loglog(
+                    [r["cells"] for r in drawn], [of(r) for r in drawn], color=colour, linewidth=1.1, label=method
+                )
+                for row in mine:
+                    x, y, marker = row["cells"], of(row), "x" if row["failure"] else "o"
+                    axes.plot(x, y, marker, color=colour, markersize=4, fillstyle="full" if row["reached"] else "none")
+                    if not (row["reached"] or row["failure"]):
                         axes.annotate("", (x, 1.8 * y), (x, y), arrowprops={"arrowstyle": "->", "color": colour})
             every = [of(row) for row in rows if of(row) > 0]  # the clock may measure no time of small meshes
             if every:
@@ -235,22 +256,32 @@ def save_costs(path: Path, rows: list[dict]) -> None:
 def speed_up(rows: list[dict]) -> dict[str, float | None]:
     """Least ratio of the time of the explicit scheme to that of Newton's method on the finest mesh, for each soil.
 
-    None where Newton's method did not come to its end, or in less time than the clock measures.
+    None where one of them failed, or Newton's method did not come to its end, or in less time than the clock measures.
     """
-    finest = max(row["cells"] for row in rows)
-    last = {(row["soil"], row["method"]): row for row in rows if row["cells"] == finest}
+    finest = max((row["cells"] for row in rows), default=0)
+    last = {(row["soil"], row["method"]): row for row in rows if row["cells"] == finest and not row.get("failure")}
     ratios: dict[str, float | None] = {}
     for soil in SOILS:
-        explicit, newton = (last[soil, method] for method in ("explicit", "Newton"))
-        known = newton["reached"] and newton["cpu_seconds"] > 0
+        explicit, newton = (last.get((soil, method)) for method in ("explicit", "Newton"))
+        known = explicit and newton and newton["reached"] and newton["cpu_seconds"] > 0
         ratios[soil] = explicit["cpu_seconds"] / newton["cpu_seconds"] if known else None
     return ratios
 
 
+def failures_of(rows: list[dict]) -> list[str]:
+    """Which runs failed, and why, in words."""
+    return [
+        f"{row.get('soil') or 'step of {:g} dt_cr'.format(row['step_over_critical'])}, {row['method']}, cells of {row['cell_size_m']:g} m "
+        f"failed: {row['failure']}"
+        for row in rows
+        if row["failure"]
+    ]
+
+
 def print_table(rows: list[dict]) -> None:
-    """The rows as text; lower bounds are marked."""
+    """The rows as text; lower bounds and failures are marked."""
     for row in rows:
-        bound = "  " if row["reached"] else "> "
+        bound = "  " if row["reached"] else "x " if row["failure"] else "> "
         place = row.get("soil", f"{row.get('step_over_critical', 0):g} dt_cr")
         print(f"{place:10} {row['method']:25} h {row['cell_size_m']:<7g} {bound}{row['cpu_seconds']:9.3f} s  "
               f"{row['force_evaluations']:9} evaluations  {row.get('out_of_balance_ratio', 0):.1e}", flush=True)  # fmt: skip
@@ -264,11 +295,15 @@ def main(arguments: list[str] | None = None) -> int:
     if comm.size > 1:
         raise mpm.InputError(f"the study cost measures one processor, but runs on {comm.size} ranks")
     folder = open_results(a, comm)
-    rows, steps = [], []
+    rows, steps, unstressed = [], [], []
     for level in range(a.meshes):
         mesh = Namespace(**{**vars(a), "cell_size": a.cell_size / 2**level})
         for soil in SOILS:
-            stress = initial_stress(mesh, soil)
+            try:
+                stress = initial_stress(mesh, soil)
+            except mpm.InputError as error:
+                unstressed.append(f"{soil}, cells of {mesh.cell_size:g} m: no stresses to begin with: {error}")
+                continue
             for name in ("explicit", *SOLVERS):
                 rows.append(measured(mesh, soil, name, stress))
                 print_table(rows[-1:])
@@ -280,10 +315,15 @@ def main(arguments: list[str] | None = None) -> int:
     save_table(folder / "steps.csv", steps)
     ratios = speed_up(rows)
     results = {f"explicit_over_newton_{soil}_seconds_ratio": ratio for soil, ratio in ratios.items()}
-    captions = {"cost": "Cost of equilibrium; hollow markers with an arrow are lower bounds."}
+    failures = [*unstressed, *failures_of(rows), *failures_of(steps)]
+    results["failures"] = failures
+    captions = {
+        "cost": "Cost of equilibrium; hollow markers with an arrow are lower bounds, and crosses runs that failed"
+    }
     pictures = {"cost": lambda: save_costs(folder / "cost.png", rows)}
     results |= {"equilibrium": rows, "steps": steps}
-    return write_summary(folder, a, results, comm, Page(captions=captions), pictures, said="")
+    code = write_summary(folder, a, results, comm, Page(captions=captions), pictures, said="\n".join(failures))
+    return code or (1 if failures else 0)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from study_main import ended
 
+import fenics_bridge as bridge
+import mpm_core as mpm
+
 COARSE = "--cell-size", "0.2", "--crest", "1.2"
 
 
@@ -100,3 +103,25 @@ def test_the_cost_of_newtons_method_has_no_ratio_where_it_is_not_known():
     assert study.speed_up(rows) == {"drained": 3.0, "undrained": None}
     rows[1]["reached"] = False
     assert study.speed_up(rows)["drained"] is None
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_a_run_of_cost_that_fails_keeps_the_others(tmp_path, monkeypatch):
+    """The slope collapses under the unit weight of limit analysis, so that no drained equilibrium under twice that gives the undrained runs
+    their stresses; one iteration of Newton's method finds none of plastic soil either. The explicit scheme is a row as before.
+    """
+    study = importlib.import_module("cost")
+    heavy = 2 * bridge.log_spiral(1.0, 45.0, 1e3, 25.0, 1.1).unit_weight
+    monkeypatch.setattr(study, "SOLVERS", {"Newton": lambda: mpm.Newton(max_iterations=1)})
+    monkeypatch.setattr(study, "MULTIPLES", (20,))
+    options = f"--meshes 1 --mesh fitted --cell-size 0.5 --particles-per-cell 1 --limit 1 --initial-unit-weight {heavy} --unit-weight {1.1 * heavy}"
+    result = ended("cost", tmp_path, *options.split())
+    assert result.returncode == 1, result.stderr
+    assert "undrained, cells of 0.5 m: no stresses to begin with: --initial-unit-weight is" in result.stdout
+    assert "drained, Newton, cells of 0.5 m failed: no equilibrium" in result.stdout
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    explicit, newton = summary["equilibrium"]
+    assert explicit["method"] == "explicit" and explicit["failure"] is None
+    assert newton["method"] == "Newton" and not newton["reached"] and newton["failure"] in summary["failures"][1]
+    assert summary["explicit_over_newton_drained_seconds_ratio"] is None
+    assert (tmp_path / "equilibrium.csv").read_text().count("\n") == 3
