@@ -8,7 +8,7 @@ from PIL import Image
 from particle_player import Movie
 from studies.common.parameters import Parameter
 from studies.common.plots import DISPLACEMENT, SHEAR_STRAIN, Scene
-from studies.common.report import Report, save_report
+from studies.common.report import Report, Section, save_report
 
 pytestmark = NEEDED
 SIDE, TIMES = 40, np.linspace(0.0, 2.0, 11)
@@ -65,6 +65,31 @@ def test_it_loads_without_errors_and_without_a_network(browser, page):
     text = page.read_text()
     assert "http://" not in text.replace("http://www.w3.org/2000/svg", "") and "https://" not in text
     assert browser.execute_script("return document.querySelector('figure img').naturalWidth") == 8
+
+
+@pytest.mark.parametrize("width", [1300, 700])
+def test_wide_tables_scroll_by_themselves(browser, page, tmp_path, width):
+    """Nine members have 36 columns of forces, and their results long names; neither makes the page wider than its window."""
+    forces = {f"largest_axial_force_of_nail_{k}_{part}_N": 123456.7 for k in range(9) for part in "abcd"}
+    stages = Section("Stages", columns=["Stage", *forces], rows=[["in situ", *["123456.7"] * len(forces)]])
+    path = tmp_path / "report.html"
+    long = {f"members_in_last_equilibrium: {name}": value for name, value in forces.items()}
+    options = [Parameter("name_of_an_option", 1.0, "kN/m3", "what it means, in some words")]
+    save_report(path, Report("Nails", sections=[stages], parameters=options, results=long))
+    size = browser.get_window_size()
+    browser.set_window_size(width, 1000)
+    try:
+        open_page(browser, path)
+        inside = "return [document.documentElement.scrollWidth, document.documentElement.clientWidth]"
+        wide, shown = browser.execute_script(inside)
+        assert wide <= shown
+        scrolls = (
+            "const t = document.querySelector('section table').parentElement; return t.scrollWidth > t.clientWidth"
+        )
+        assert browser.execute_script(scrolls)
+    finally:
+        browser.set_window_size(size["width"], size["height"])
+        open_page(browser, page)
 
 
 def test_positions_are_those_that_were_given(browser):
