@@ -69,7 +69,7 @@ from .mesh import check_soils, geometry_of, site_mesh
 from .names import mistakes_in, require_soils
 from .stages import stage_of, warn_of_held
 from .strength import law_of_table, ratio_of, with_strength_ratios, without_history
-from .supports import supports_of, warn_of_rigid_core
+from .supports import supports_of, supports_of_soil, warn_of_rigid_core
 
 
 @dataclass
@@ -140,7 +140,7 @@ class Site:
             body,
             laws or self.laws,
             facet_tags,
-            self.supports,
+            supports_of_soil(self.supports, body, facet_tags),
             degree,
             cell_tags=cell_tags,
             geometry=self.geometry,

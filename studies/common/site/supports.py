@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge.compat import facet_nodes
 from fenics_bridge.fem.supports import tagged_facets
+from fenics_bridge.mesh.names import known_tags
 
 from ..checks import say
 from .doubts import ends_of_mesh
@@ -42,6 +43,12 @@ def supports_of(table: dict, path: Path, domain: Any, facet_tags: Any) -> list[b
     if not table.get("supports"):
         _warn_of_free_sides(path, domain, facet_tags, given)
     return [support_of(name, kind, f"{path}: supports.{name}", domain, facet_tags) for name, kind in given.items()]
+
+
+def supports_of_soil(supports: Sequence[bridge.Support], domain: Any, facet_tags: Any) -> list[bridge.Support]:
+    """Those supports whose boundaries are at a body of soil; others hold what slides there only. Collective."""
+    names, there = bridge.names_of(facet_tags), set(known_tags(domain.comm, facet_tags))
+    return [one for one in supports if there.intersection(names.get(str(one.facet_tag), ()))]
 
 
 def warn_of_rigid_core(path: Path, domain: Any, facet_tags: Any, supports: Mapping[str, str] | None) -> None:

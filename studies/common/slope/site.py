@@ -29,6 +29,7 @@ from ..site.flow_doubts import warn_of_rigid_soil
 from ..site.k0 import k0_of, overconsolidation_of, say_left_out
 from ..site.keys import CHANGES, changes_of
 from ..site.strength import refuse_strength_ratio
+from ..site.supports import supports_of_soil
 from ..water.site import corners_of, effective_laws, read_water_table, standing_load, times_of
 
 
@@ -88,8 +89,9 @@ class SlopeSite:
         """Elements of the soil, unloaded, under given pore pressures. Collective."""
         domain, cell_tags, facet_tags = self.body
         site = self.site
+        supports = supports_of_soil(site.supports, domain, facet_tags)
         fem = bridge.QuasiStatic(
-            domain, laws or site.laws, facet_tags, site.supports, degree, cell_tags=cell_tags, **options
+            domain, laws or site.laws, facet_tags, supports, degree, cell_tags=cell_tags, **options
         )
         site.vary(fem, laws or site.laws)
         fem.reconfigure(pore_pressure=pore_pressure)

@@ -146,3 +146,19 @@ def test_pore_pressures_of_an_embankment_stay_in_space_as_it_slides(tmp_path):
     assert p.traction[:, 1].sum() == 0
     act()
     assert p.traction[:, 1].sum() == pytest.approx(9810.0)
+
+
+def test_a_boundary_of_the_air_holds_what_slides_and_not_the_soil(tmp_path):
+    """A support by default, or in the file, is none of the elements where only empty cells are at its boundary."""
+    path = site_in(tmp_path, SITE.replace('mesh = "block.geo"', 'mesh = "block.geo"\nair = ["pond"]'))
+    give_room(tmp_path)
+    geometry = (tmp_path / "block.geo").read_text().replace('"air"', '"pond"')
+    (tmp_path / "block.geo").write_text(
+        geometry + 'Physical Curve("right") = {Curve In BoundingBox{3 - e, -e, -e, 3 + e, 2 + e, e}};\n'
+    )
+    site = site_file.read_site(path, MPI.COMM_WORLD)
+    assert [support.facet_tag for support in site.supports] == ["base", "left", "right"]
+    fem = site.finite_elements(1)
+    fem.solve(site.load())
+    assert fem.converged and fem.reaction("base")[1] == pytest.approx(-28e3)
+    assert site.particles(3).particles.mass.sum() == pytest.approx(28e3 / 9.81)
