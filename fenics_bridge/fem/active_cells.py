@@ -60,7 +60,7 @@ def reconfigure(
     points.assign(np.where(there.x.array[: owned_cells(domain)] > 0, model._materials.number, -1), len(laws))
     take_over(model, new, laws, before, given, parameters, harden)
     model.law, model.off = law, off
-    _support(model, model.supports if supports is None else tuple(supports), there)
+    _support(model, model.supports if supports is None else tuple(supports), there, bool(prepared))
     space = model.displacement.function_space
     model._loads = LoadVectors(space, model.facet_tags, model.cell_tags, active=active, radius=model.radius)
     model._change_members(prepared)
@@ -125,13 +125,13 @@ def take_over(
         points.stress[other], points.state[other] = points.trial_stress[other], points.trial_state[other]
 
 
-def _support(model: Any, supports: Any, there: Any) -> None:
-    """Fix the nodes of the supports, and the nodes without an active cell, at their present displacement."""
+def _support(model: Any, supports: Any, there: Any, reinforced: bool) -> None:
+    """Fix the nodes of the supports, and the nodes without an active cell, at their present displacement; reinforced: as for `_assemble`."""
     space = model.displacement.function_space
     constraints = Constraints(space, model.facet_tags, supports, lonely_nodes(space, there))
     constraints.origin[:] = model.displacement.x.array[constraints.dofs]
     model.supports = supports
-    model._assemble(constraints)
+    model._assemble(constraints, reinforced)
 
 
 def lonely_nodes(space: Any, there: Any) -> NDArray[np.int32]:

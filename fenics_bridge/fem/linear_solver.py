@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,9 @@ MOST_ITERATIONS = 100
 AVERAGED_LIMIT = 100
 """Nodes in three dimensions up to which a system with averaged strains is factorised by default: its rows have many entries"""
 
+FALLBACK_LIMIT = 20_000
+"""Nodes in three dimensions up to which a factorisation takes the place of an iterative solver that has failed beside structural members"""
+
 FACTORISING = ("lu", "cholesky", "telescope", "redundant")
 """PETSc's preconditioners that factorise the matrix"""
 
@@ -47,7 +51,9 @@ class LinearSolver:
 
     The default is LU up to `DIRECT_LIMIT` nodes and for mixed spaces, by MUMPS on all ranks where there are more than
     `ALONE_LIMIT`, and GMRES with algebraic multigrid above; averaged strains in three dimensions have their limit
-    at `AVERAGED_LIMIT`. PETSc options with `options_prefix` change it, for instance -elastic_ksp_type cg -elastic_pc_type gamg.
+    at `AVERAGED_LIMIT`, but for those with structural members, whose stiffness can be added to a matrix only. Where multigrid fails
+    beside members, which may be stiffer than the soil by many orders, LU takes its place from then on, with a warning.
+    PETSc options with `options_prefix` change all this, for instance -elastic_ksp_type cg -elastic_pc_type gamg.
 
     Args:
         space: space of the unknowns.
@@ -55,18 +61,22 @@ class LinearSolver:
         newton: whether systems are those of Newton's iterations: an iterative solver need not solve the first ones well, and a
             tangent that is singular, as where all soil around a node has failed in tension, gets a part of the first matrix.
         averaged: whether strains are averaged over nodes, which gives a matrix many entries.
+        reinforced: whether there are structural members.
     """
 
-    def __init__(self, space: Any, options_prefix: str, newton: bool = False, averaged: bool = False) -> None:
+    def __init__(
+        self, space: Any, options_prefix: str, newton: bool = False, averaged: bool = False, reinforced: bool = False
+    ) -> None:
         self._comm, index_map = space.mesh.comm, space.dofmap.index_map
         dim, bs = space.mesh.geometry.dim, space.dofmap.index_map_bs
         self._n_owned = index_map.size_local * bs
         displacements = bs == dim
         alone = index_map.size_global <= ALONE_LIMIT[dim]
-        limit = AVERAGED_LIMIT if averaged and dim == 3 else DIRECT_LIMIT[dim]
+        limit = AVERAGED_LIMIT if averaged and dim == 3 and not reinforced else DIRECT_LIMIT[dim]
         direct = not displacements or index_map.size_global <= limit
-        choice = direct_options(self._comm.size, alone, pivoting=not displacements)
-        self._options = choice if direct else multigrid_options(dim, EXACT)
+        self._factorising = direct_options(self._comm.size, alone, pivoting=not displacements)
+        self._may_factorise = reinforced and not direct and index_map.size_global <= FALLBACK_LIMIT
+        self._options = self._factorising if direct else multigrid_options(dim, EXACT)
         if newton and not direct:
             self._options["ksp_max_it"] = MOST_ITERATIONS
         self._options_prefix, self._newton = options_prefix, newton
@@ -106,6 +116,22 @@ class LinearSolver:
             if "ksp_rtol" in options:
                 options["ksp_rtol"] = tolerance
         self.iterations.append(0)
+        failure, added = self._solved_with_parts(matrix, right, solution, options)
+        if failure and self._gives_way(matrix):
+            if added and self._first is not None:
+                matrix.axpy(-added, self._first, PETSc.Mat.Structure.UNKNOWN_NONZERO_PATTERN)
+            self._part = 0.0
+            failure, added = self._solved_with_parts(matrix, right, solution, self._options)
+        self._part = 0.0 if failure else added
+        if self._newton and not failure and self._first is None:
+            self._first = matrix.copy()
+        if not failure:
+            increment.x.array[: self._n_owned] = solution.array_r
+            increment.x.scatter_forward()
+        return failure
+
+    def _solved_with_parts(self, matrix: Any, right: Any, solution: Any, options: dict[str, Any]) -> tuple[str, float]:
+        """Solve with as small a part of the first matrix added as it takes; the reason of a failure, and the part. Collective."""
         failure, added = "", 0.0
         for part in [p for p in (0.0, *PARTS) if p >= self._part]:
             if self._first is not None and part > added:
@@ -115,13 +141,23 @@ class LinearSolver:
             failure = self._solved(matrix, right, solution, options)
             if not failure or self._first is None:
                 break
-        self._part = 0.0 if failure else added
-        if self._newton and not failure and self._first is None:
-            self._first = matrix.copy()
-        if not failure:
-            increment.x.array[: self._n_owned] = solution.array_r
-            increment.x.scatter_forward()
-        return failure
+        return failure, added
+
+    def _gives_way(self, matrix: Any) -> bool:
+        """Whether a factorisation takes the place of the iterative solver, which has failed, from now on. Collective."""
+        chosen = PETSc.Options(self._options_prefix)
+        own = any(chosen.hasName(name) for name in ("pc_type", "ksp_type", "ksp_max_it"))
+        if not self._may_factorise or own or not isinstance(matrix, PETSc.Mat):
+            return False
+        self._options, self._may_factorise = self._factorising, False
+        if self._comm.rank == 0:
+            warnings.warn(
+                "the iterative solver of linear systems failed beside structural members, which may be much stiffer than the soil: a "
+                "factorisation takes its place from now on, which needs more memory (docs/members.md)",
+                RuntimeWarning,
+                stacklevel=2,
+            )
+        return True
 
     def _solved(self, matrix: Any, right: Any, solution: Any, options: dict[str, Any]) -> Any:
         operators = (matrix, matrix) if isinstance(matrix, PETSc.Mat) else (matrix.operator, matrix.preconditioner)

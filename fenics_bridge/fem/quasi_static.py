@@ -145,11 +145,11 @@ class QuasiStatic(ReinforcedBody, WetBody, SupportedBody, PointFunctions):
             "in equilibrium" if self.converged else "not in equilibrium", geometry=self.geometry, lines=law_lines(self.law),
         )  # fmt: skip
 
-    def _assemble(self, constraints: Constraints) -> None:
-        """The Body that a step changes, with the present points and the given constraints. Collective."""
+    def _assemble(self, constraints: Constraints, reinforced: bool = False) -> None:
+        """The Body that a step changes, with the present points and the given constraints; reinforced: whether it has members. Collective."""
         require_axis_held(self.displacement.function_space, self.geometry, constraints)
         parts = self.increment, self.points, constraints
-        linear = LinearSolver(self.displacement.function_space, self._options_prefix, newton=True, averaged=self._nmd)
+        linear = self._linear_solver(reinforced)
         self._kinematics: Any = (
             AveragedKinematics(*parts, self.laws, self.geometry, self._as_particles, linear.direct)
             if self._nmd
@@ -157,6 +157,11 @@ class QuasiStatic(ReinforcedBody, WetBody, SupportedBody, PointFunctions):
         )
         operators = self._kinematics, constraints, linear, self._members
         self._body = Body(self.displacement, self.increment, self.points, *operators)
+
+    def _linear_solver(self, reinforced: bool) -> LinearSolver:
+        """A new solver of linear systems, of a body with or without members. Collective."""
+        space = self.displacement.function_space
+        return LinearSolver(space, self._options_prefix, newton=True, averaged=self._nmd, reinforced=reinforced)
 
     def reconfigure(
         self,

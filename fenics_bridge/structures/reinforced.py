@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from mpm_core.members import Member, MemberForces
+from mpm_core.petsc import DIRECT_LIMIT
 
 from fenics_bridge.errors import agree
-from fenics_bridge.fem.linear_solver import AVERAGED_LIMIT
 from fenics_bridge.structures.installed import Members
 from fenics_bridge.structures.member_warnings import warn_of_members
 
@@ -19,6 +20,7 @@ class ReinforcedBody:
     domain: Any
     radius: Any
     _body: Any
+    _linear_solver: Callable[..., Any]
     _members: Members
     _options_prefix: str
 
@@ -60,13 +62,18 @@ class ReinforcedBody:
         wrong = None if other is None else f"{other!r} has {members[other].dim} dimensions, expected {dim}"
         if self.radius is not None:
             wrong = wrong or next(filter(None, (_no_shell(name, one) for name, one in members.items())), None)
-        if members and getattr(self._body.kinematics, "factored", False):
+        if members and self._keeps_factors():
             wrong = (
-                f"there are some with nmd=True in more than {AVERAGED_LIMIT} nodes of three dimensions, expected a factorisation, by "
+                f"there are some with nmd=True in more than {DIRECT_LIMIT[dim]} nodes of three dimensions, expected a factorisation, by "
                 f"PETSC_OPTIONS='-{self._options_prefix}pc_type lu' in the environment (docs/solvers.md), or elements of degree=2"
             )
         agree(comm, wrong and f"{where}members: {wrong}")
         return self._members.prepared(members, active, where)
+
+    def _keeps_factors(self) -> bool:
+        """Whether the stiffness stays in factors, to which that of members cannot be added, also where there are some. Collective."""
+        factored = getattr(self._body.kinematics, "factored", False)
+        return factored and not self._linear_solver(reinforced=True).direct
 
     def _change_members(self, prepared: Any) -> None:
         """Install, keep and remove members that were prepared. Collective."""

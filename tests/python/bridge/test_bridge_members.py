@@ -42,28 +42,6 @@ def test_a_bar_and_soil_share_the_force_of_a_plate_by_their_stiffness(options):
     assert np.allclose(forces.displacement[:, 1], -strain * forces.positions[:, 1], atol=1e-12)
 
 
-def test_averages_in_three_dimensions_name_the_option_by_which_they_take_members():
-    # A mesh of 225 nodes
-    law, nail = mpm.LinearElastic(young=1e6, poisson=0.3), mpm.bar(
-        [(0.1, 0.5, 0.5), (1.9, 0.5, 0.5)], axial_stiffness=1e6
-    )
-    fem = body((2.0, 1.0, 1.0), (8, 4, 4), law, [bridge.fixed(LEFT)], degree=1, nmd=True)
-    with pytest.raises(
-        mpm.InputError, match=r"in more than 100 nodes .* by PETSC_OPTIONS='-fem_pc_type lu' in the environment"
-    ):
-        fem.reconfigure(members={"nail": nail})
-
-
-def test_a_bar_in_three_dimensions_carries_its_share():
-    supports = [bridge.roller(5, (0, 0, 1)), bridge.roller(1, (1, 0, 0)), bridge.roller(3, (0, 1, 0)),
-                bridge.prescribed(6, (None, None, -0.01))]  # fmt: skip
-    fem = body((1.0, 1.0, 2.0), (2, 2, 4), mpm.LinearElastic(young=1e6, poisson=0.0), supports, degree=1)
-    fem.reconfigure(members={"bar": mpm.bar([(0.3, 0.6, 0.0), (0.3, 0.6, 2.0)], 3e6)})
-    fem.solve(bridge.Load(displacement=1.0))
-    assert np.allclose(fem.member_forces("bar").axial_force, -3e6 * 0.005, rtol=1e-8)
-    assert fem.reaction(6)[2] == pytest.approx((1e6 + 3e6) * 0.005, rel=1e-8)
-
-
 def simply_supported(cells, degree=2):
     """Deflection and moments of a beam on two supports under 1 kPa; the soil below it is 1e5 times softer."""
     length, pressure, stiffness = 4.0, 1e3, 1e6
