@@ -139,12 +139,12 @@ def main(arguments: list[str] | None = None) -> int:
     start = perf_counter()
     site = read_site(a.site, comm, a.cell_size, needed=("stages",))
     folder = open_results(a, comm)
-    degree, averaged = int(a.elements[1]), slides.averages(a, site.laws.values())
-    nmd = averaged and degree == 1
+    degree = int(a.elements[1])
+    nmd = a.nmd and degree == 1
     run = carry_out(site, degree, folder, comm, nmd=nmd, as_particles=nmd and begins_from_elements(site))
     failed, rows = run.stopped, run.rows
     built = perf_counter()
-    particles, failed_particles = build(site, slides.particles_per_cell(a, site), a.factor, averaged, run.site)
+    particles, failed_particles = build(site, slides.particles_per_cell(a, site), a.factor, a.nmd, run.site)
     own_stages = not (failed or failed_particles or begins_from_elements(site))
     apart = stress_difference(particles, run.site) if own_stages else None
     model = particles.model

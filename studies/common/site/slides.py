@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from mpm_core.law_warnings import keeps_volume
 from mpm_core.output import ModelOutput
 
 import fenics_bridge as bridge
@@ -138,11 +137,6 @@ def particles_per_cell(a: Namespace, site: Site) -> int:
     return int(a.particles_per_cell) if given else IN_TETRAHEDRON
 
 
-def averages(a: Namespace, laws: Iterable[Any]) -> bool:
-    """Whether the slide averages strains: as asked for, else where the soil keeps its volume."""
-    return keeps_volume(list(laws)) if a.nmd is None else a.nmd
-
-
 def slide(
     a: Namespace, model: mpm.Model, folder: Path, interrupt: Interrupt, update: Callable[[], None] = lambda: None,
     step: float | None = None,
@@ -150,12 +144,11 @@ def slide(
     """Follow the particles by the explicit scheme; returns also why the run ended early if it did. Collective.
 
     Args:
-        a: options with time, frames, damping, pic and nmd; without a nmd, strains are averaged where the soil keeps its volume.
+        a: options with time, frames, damping, pic and nmd.
         update: called after each frame, such as for loads that change with the shape of the body.
         step: of the implicit scheme, in the place of the explicit one [s].
     """
-    nmd = averages(a, model.laws)
-    options = {"every": a.time / a.frames, "damping": a.damping, "pic": a.pic, "nmd": nmd}
+    options = {"every": a.time / a.frames, "damping": a.damping, "pic": a.pic, "nmd": a.nmd}
     scheme = model.explicit if step is None else partial(model.implicit, dt=step)
     with (
         History(
@@ -247,13 +240,12 @@ def site_slide(a: Namespace) -> int:
     site = read_site(a.site, comm, a.cell_size)
     folder = open_results(a, comm)
     say(site.left_out_at_once())
-    nmd = averages(a, site.laws.values())
-    fem = site.finite_elements(1, nmd=nmd, solver=bridge.Solver(tolerance=1e-10), as_particles=nmd)
+    fem = site.finite_elements(1, nmd=a.nmd, solver=bridge.Solver(tolerance=1e-10), as_particles=a.nmd)
     with without_warning(NOT_REACHED):  # said by the error
         _carry_weight(site, fem, a.site)
     random = strength_pictures(site, fem, folder) if a.pictures else {}
     model = site.particles(particles_per_cell(a, site), more=site.weaker_laws(a.factor))
-    handover = bridge.initialise(model, fem, count_displacement=False, nmd=nmd, equilibrate=not fem.members)
+    handover = bridge.initialise(model, fem, count_displacement=False, nmd=a.nmd, equilibrate=not fem.members)
     model.assign(model.particles.material + len(site.laws))
     with Interrupt(comm) as interrupt:
         result, stopped = slide(a, model, folder, interrupt)

@@ -31,7 +31,7 @@ from ..movie import particle_movie
 from ..options import add_choice, add_flag, add_number
 from ..scenes import scene_of
 from ..site.doubts import ends_of_height
-from ..site.slides import add_slide_options, averages, slide, slide_pictures
+from ..site.slides import add_slide_options, slide, slide_pictures
 from ..slope.site import SlopeSite
 from .site import DAY, by_law, directions_of, time_in_words, vertical_conductivity
 from .slopes import Instant, lowest
@@ -103,7 +103,7 @@ def slide_of(
         step, act = a.slide_step, lambda: None
         warn_of_entering_water(slope, instant, model, a.time)
         let_water_flow(slope, instant, model)
-    unbalanced = model.out_of_balance(nmd=a.slide_water == "still" and averages(a, model.laws))
+    unbalanced = model.out_of_balance(nmd=a.slide_water == "still" and a.nmd)
     with Interrupt(comm) as interrupt:
         result, stopped = slide(a, model, folder, interrupt, act, step)
     moved = result.history["largest_displacement_m"][-1]
@@ -211,7 +211,7 @@ def handed_over(
         return np.maximum(instant.pore_pressure(points), 0.0)
 
     # Implicit steps, where water flows, average strains only.
-    nmd = averages(a, site.laws.values()) and a.slide_water == "still"
+    nmd = a.nmd and a.slide_water == "still"
     for part in HOLDING:
         stronger = bridge.reduced_strength(site.laws, part * instant.safety.value)
         fem = slope.elements(1, pressure, stronger, nmd=nmd, solver=bridge.Solver(tolerance=1e-10), as_particles=nmd)

@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 from site_cases import SITE, give_room, site_in
 
+import fenics_bridge as bridge
 import mpm_core as mpm
 
 ROOT = Path(__file__).parents[3]
@@ -162,3 +163,30 @@ def test_a_boundary_of_the_air_holds_what_slides_and_not_the_soil(tmp_path):
     fem.solve(site.load())
     assert fem.converged and fem.reaction("base")[1] == pytest.approx(-28e3)
     assert site.particles(3).particles.mass.sum() == pytest.approx(28e3 / 9.81)
+
+
+SLOPE = """
+mesh = "{mesh}"
+cell_size = 1.0
+air = ["empty"]
+constants = {{height = 10.0, angle = 45.0, crest = 15.0, runout = 25.0, headroom = 2.0}}
+[soils.soil]
+unit_weight = 19e3
+young = 20e6
+poisson = 0.3
+cohesion = 12e3
+friction_angle = 30.0
+dilation_angle = 30.0
+"""
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_a_slope_that_limit_analysis_lets_fail_does_not_stand_by_stiff_cells(tmp_path):
+    """Its log-spiral is an upper bound of its factor of safety, so that under 15 % more it fails; linear cells without averages
+    are stronger by a fifth, and hold it at 0.2 m."""
+    path = tmp_path / "slope.toml"
+    path.write_text(SLOPE.format(mesh=ROOT / "meshes" / "slope.geo"))
+    factor = 1.15 * bridge.log_spiral_safety(10.0, 45.0, 12e3, 30.0, 19e3)
+    options = ["--site", path, "--factor", factor, "--time", 5, "--frames", 5, "--output", tmp_path / "slide"]
+    assert importlib.import_module("slope").main([str(word) for word in options]) == 0
+    assert json.loads((tmp_path / "slide" / "summary.json").read_text())["largest_displacement_m"] > 0.5
