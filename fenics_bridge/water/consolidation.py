@@ -35,6 +35,7 @@ from fenics_bridge.types import Laws, MeshTags, OfPosition
 from fenics_bridge.views import body_text
 from fenics_bridge.water.applied import AppliedBoundary
 from fenics_bridge.water.boundary import Flux, WaterBoundary, listed
+from fenics_bridge.water.consolidation_pace import Pace
 from fenics_bridge.water.consolidation_results import ConsolidationResults
 from fenics_bridge.water.consolidation_step import (
     ConsolidationReport,
@@ -166,6 +167,7 @@ class Consolidation(ConsolidationResults):
         self.motion: Motion | None = None
         """Velocity and acceleration; None in quasi-static steps"""
         self._named_large_strains = False
+        self._pace: Pace | None = None  # of the last `run`
         self._named_coarse_cells = False  # whether `run` has warned of cells that are too large for its first step
         self._options_prefix = options_prefix
         self._assemble(inertia)
@@ -269,6 +271,7 @@ class Consolidation(ConsolidationResults):
             InputError: values of another shape or not finite, finite elements that did not converge, or that are without a
                 member which is here. Raised on all ranks alike.
         """
+        self._pace = None
         set_initial_state(self, stress, pore_pressure)
 
     def reconfigure(
@@ -305,6 +308,7 @@ class Consolidation(ConsolidationResults):
             InputError: an unknown tag, a value out of range, or a member outside of the soil. Raised on all ranks alike.
         """
         given = collectively(self.domain.comm, lambda: None if members is None else of_members(members))
+        self._pace = None
         reconfigure(self, off, supports, pore_pressure, stress, law, duration, given)
 
     # --- steps -------------------------------------------------------------------------------------------------------
@@ -365,6 +369,7 @@ class Consolidation(ConsolidationResults):
         growth: float = 1.2,
         longest: float = np.inf,
         progress: Callable[[ConsolidationReport], Any] | None = None,
+        accuracy: float | None = None,
     ) -> list[ConsolidationReport]:
         """Make steps up to a time, each longer than the one before while Newton's method converges quickly. Collective.
 
@@ -377,6 +382,9 @@ class Consolidation(ConsolidationResults):
             growth: factor from step to step, 1 or more [-].
             longest: length of the longest step [s].
             progress: function that is called with each report.
+            accuracy: estimated error of the displacements by the length of the steps, over the largest displacement [-], up to which steps
+                grow, and beyond which they become shorter, down to the first one; None for steps of any length. A run goes on with the
+                estimate of the one before, unless the model was changed or its first step is shorter than the last one there.
 
         Returns:
             Reports of all steps; the run ended early where the last one has not converged.
@@ -384,7 +392,7 @@ class Consolidation(ConsolidationResults):
         Raises:
             InputError: an argument out of range. Raised on all ranks alike.
         """
-        return run(self, until, first_step, growth, longest, progress)
+        return run(self, until, first_step, growth, longest, progress, accuracy)
 
     def load_at(self, time: float) -> Load:
         """The load at a time [s]."""

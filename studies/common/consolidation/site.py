@@ -93,12 +93,17 @@ class ConsolidationSite:
         water_rows = times_of(one for stage in self.stages for one in stage.boundary.values())
         return corners_of(starts | ends | rows | water_rows, apart, always=starts)
 
+    @property
+    def creeps(self) -> bool:
+        """Whether a soil creeps."""
+        return any(getattr(each, "creep", 0.0) > 0 for law in self.site.laws.values() for each in with_inner_laws(law))
+
     def changes_until(self, end: float) -> bool:
         """Whether soil, a pressure or what the water does changes after the beginning, at which all is in equilibrium, before `end` [s].
 
         Soil that creeps changes in any case.
         """
-        if any(getattr(each, "creep", 0.0) > 0 for law in self.site.laws.values() for each in with_inner_laws(law)):
+        if self.creeps:
             return True
         conditions = [one for stage in self.stages for one in stage.boundary.values()]
         given = [getattr(one, key, None) for one in conditions for key in ("level", "rate")]
