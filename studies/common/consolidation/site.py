@@ -7,7 +7,7 @@
     material = "mohr-coulomb"          # of effective stresses, and the parameters of the law, named as options of the study slope
 
     [supports]                         # as for sites of stages
-    [pressures]                        # Pa on a boundary, beside that of reservoirs: a number, or rows [days, Pa]
+    [pressures]                        # Pa on a boundary, beside that of reservoirs: a number, or rows [days, Pa]; the first one holds before it
     [points]                           # name = [x, y]: places whose settlements are followed
 
     [[stages]]                         # soil and members that come and go while the ground consolidates

@@ -39,6 +39,8 @@ class GroundStage:
 def pressure_table(given: Any, where: str) -> Table:
     """A pressure over time, in s and Pa, from a number [Pa] or rows [days, Pa] that are joined by straight lines.
 
+    The pressure of the first row holds before it, and that of the last row after it.
+
     Args:
         given: number or rows.
         where: it stands, for messages.
@@ -63,6 +65,10 @@ def pressure_table(given: Any, where: str) -> Table:
         raise mpm.InputError(
             f"{where}: day {second:g} comes after day {first:g}, expected rows [days, Pa] of rising days"
         )
+    first, pressure = table[0]
+    if isinstance(given, list) and first > 0 and pressure > 0:
+        say(f"{where} begins on day {first:g} with {pressure:g} Pa, which act before it as well, also in the equilibrium at the beginning: for another pressure "
+            "until then begin with a row of day 0, such as [0.0, 0.0]")  # fmt: skip
     return tuple((DAY * float(day), float(value)) for day, value in table)
 
 
