@@ -22,6 +22,8 @@ from common.consolidation.particles import ParticleGround, near_line
 from common.consolidation.plots import (
     EXCESS,
     ExcessPicture,
+    by_logarithm,
+    end_of_primary,
     save_excess,
     save_excess_film,
     save_isochrones,
@@ -184,15 +186,18 @@ class Files(FieldFiles):
 
     def _picture(self) -> ExcessPicture | None:
         """Excess pressures and displacements now; None but on the first rank. Collective."""
-        excess, moved = self._that_is_there(gathered(self._excess, self._half)), gathered(self._model.displacement)
-        name, members = f"After {time_in_words(self._model.time)}", self.members.lines(self._model)
-        return None if excess is None or moved is None else ExcessPicture(name, excess, moved.values, members)
+        excess, soils = self._that_is_there(gathered(self._excess, self._half))
+        moved, members = gathered(self._model.displacement), self.members.lines(self._model)
+        if excess is None or moved is None:
+            return None
+        return ExcessPicture(f"After {time_in_words(self._model.time)}", excess, moved.values, members, soils)
 
-    def _that_is_there(self, field: Field | None) -> Field | None:
-        """A field on the first rank without the cells of soil that is not there now. Collective."""
+    def _that_is_there(self, field: Field | None) -> tuple[Field | None, np.ndarray]:
+        """A field on the first rank without the cells of soil that is not there now, and the number of the soil of each cell. Collective."""
         centres = np.empty((0, 2)) if field is None else field.points[field.cells].mean(axis=1)
-        number = bridge.evaluate_at(centres, number=self._model.material_function())["number"][:, 0]
-        return None if field is None else replace(field, cells=field.cells[number > -0.5])
+        number = np.rint(bridge.evaluate_at(centres, number=self._model.material_function())["number"][:, 0])
+        there = number >= 0
+        return None if field is None else replace(field, cells=field.cells[there]), number[there]
 
 
 def follow(a: Namespace, site: ConsolidationSite, model: water.Consolidation, files: Files) -> str | None:
@@ -262,13 +267,15 @@ def drawn(site: ConsolidationSite, files: Files, folder: Path) -> Pictures:
     """Excess pressures at the frames and in a film; settlements and the largest excess pressure over time."""
     shown, history = [picture for picture in files.pictures if picture is not None], files.history
     stages = [stage.start / DAY for stage in site.stages[1:] if 0 < stage.start / DAY < history["time_days"][-1]]
-    since = 0 if stages else 1  # the logarithm of time has no beginning
+    logarithmic = by_logarithm(history["time_days"], stages)
+    since = 1 if logarithmic else 0  # the logarithm of time has no beginning
     days = history["time_days"][since:]
     settled = {name: 1e3 * history[f"settlement_{name}_m"][since:] for name in site.points}
     largest = {name: 1e-3 * history[f"{name}_excess_pressure_Pa"][since:] for name in ("largest", "least")}
     falls = largest["least"].min(initial=0.0) < -SUCTION * np.abs(largest["largest"]).max(initial=0.0)
     if not falls:
         del largest["least"]
+    primary = end_of_primary(days, largest["largest"]) if site.creeps else None
     x, theirs, settled_theirs, largest_theirs = next(iter(site.points.values()))[0], [], {}, {}
     if files.particles is not None:
         theirs = [frame for frame in files.particles.frames if frame is not None]
@@ -280,7 +287,15 @@ def drawn(site: ConsolidationSite, files: Files, folder: Path) -> Pictures:
             folder / "isochrones.png", x, shown, [near_line(frame, x) for frame in theirs]
         ),
         "settlement.png": lambda: save_over_time(
-            folder / "settlement.png", days, settled, "Settlement [mm]", True, settled_theirs, stages
+            folder / "settlement.png",
+            days,
+            settled,
+            "Settlement [mm]",
+            True,
+            settled_theirs,
+            stages,
+            logarithmic,
+            primary,
         ),
         "largest_excess.png": lambda: save_over_time(
             folder / "largest_excess.png",
@@ -290,9 +305,11 @@ def drawn(site: ConsolidationSite, files: Files, folder: Path) -> Pictures:
             False,
             largest_theirs,
             stages,
+            logarithmic,
+            primary,
         ),
     }
-    pictures |= files.members.pictures(folder, history, since, stages)
+    pictures |= files.members.pictures(folder, history, logarithmic, stages)
     moving = [picture for picture in files.film if picture is not None]
     if len(moving) > 1:
         pictures["film"] = lambda: save_excess_film(folder / "film", moving)

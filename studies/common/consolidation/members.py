@@ -67,11 +67,11 @@ class MembersOverTime:
         """Write ``members.csv`` and the series ``members``. Collective."""
         write_members(folder, self.frames, comm)
 
-    def pictures(self, folder: Path, history: History, since: int, stages: list[float]) -> Pictures:
+    def pictures(self, folder: Path, history: History, logarithmic: bool, stages: list[float]) -> Pictures:
         """Each beam at the frames, and the largest axial forces and moments over time.
 
         Args:
-            history: of the study; since: first of its rows that is drawn.
+            history: of the study; logarithmic: scale of the time, which has no beginning.
             stages: days at which further stages begin.
         """
         if not self._members:
@@ -82,10 +82,10 @@ class MembersOverTime:
             ("axial_forces", "Largest axial force [kN/m]", axial_column, list(self._members)),
             ("moments", "Largest moment [kN m/m]", moment_column, beams),
         ):
-            curves = {name: 1e-3 * history[column(name)][since:] for name in names}
+            curves = {name: 1e-3 * history[column(name)][logarithmic:] for name in names}
             if names:
-                path, days = folder / f"{file}.png", history["time_days"][since:]
+                path, days = folder / f"{file}.png", history["time_days"][logarithmic:]
                 drawn[file] = lambda path=path, days=days, curves=curves, label=label: save_over_time(
-                    path, days, curves, label, stages=stages
+                    path, days, curves, label, stages=stages, logarithmic=logarithmic
                 )
         return drawn

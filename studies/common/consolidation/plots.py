@@ -13,9 +13,10 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
-from particle_player import axis_labels
+from particle_player import axis_labels, boundary_edges
 
 from ..animation import save_figure_film
 from ..field_plots import Field
@@ -23,6 +24,10 @@ from ..figures import curve_figure, label_axes, panel_figure, save_figure
 from ..plots import CURVES, MEMBER, ROUND_TICKS, Quantity, paper_style
 
 EXCESS = Quantity("Excess pore pressure", "kPa", scale=1e-3, colours="viridis")
+DECADES = 3
+"""Tenfold times from the first step to the end, from which on the time is drawn by its logarithm also where soil comes in stages"""
+LEFT = 0.05
+"""Of the largest excess pore pressure: once no more is left, primary consolidation counts as complete"""
 
 
 @dataclass
@@ -30,12 +35,22 @@ class ExcessPicture:
     """Excess pore pressure [Pa] at a time, and displacements of the corners (n, 2) [m], on the first rank.
 
     members: nodes (k, 2) [m] of each structural member, and their displacements [m]
+    soils: number of the soil of each cell of `excess`, whose borders are drawn; None to draw none
     """
 
     name: str
     excess: Field
     moved: np.ndarray
     members: Sequence[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
+    soils: np.ndarray | None = None
+
+    @property
+    def borders(self) -> np.ndarray:
+        """Sides of cells around each soil: rows of points (k, 2)."""
+        if self.soils is None:
+            return np.empty((0, 2), dtype=int)
+        cells = self.excess.cells
+        return np.concatenate([boundary_edges(cells[self.soils == number]) for number in np.unique(self.soils)])
 
 
 @dataclass(frozen=True)
@@ -102,6 +117,14 @@ def _draw_excess(axes: Axes, picture: ExcessPicture, enlarged: float, levels: np
     if values.min() < levels[1] < values.max():
         axes.tricontour(triangles, values, levels[1:-1], colors="black", linewidths=0.3, alpha=0.6)
     segments = Field(moved, field.cells, field.values).outline
+    axes.add_collection(
+        LineCollection(
+            moved[picture.borders],
+            colors="white",
+            linewidths=0.7,
+            path_effects=[withStroke(linewidth=1.3, foreground="black")],
+        )
+    )
     axes.add_collection(LineCollection(segments, colors="black", linewidths=0.8))
     lines = [nodes + enlarged * displaced for nodes, displaced in picture.members]
     axes.add_collection(LineCollection(lines, colors=MEMBER, linewidths=1.6, capstyle="butt"), autolim=False)
@@ -136,6 +159,27 @@ def save_isochrones(
         axes.legend(fontsize=8)
 
 
+def by_logarithm(days: np.ndarray, stages: Sequence[float]) -> bool:
+    """Whether the time is drawn on a logarithmic scale: without stages, and over more than three decades.
+
+    Args:
+        days: of the history, which begins at 0.
+        stages: days at which further stages begin.
+    """
+    return not stages or (len(days) > 1 and days[-1] > 10**DECADES * days[1])
+
+
+def end_of_primary(days: np.ndarray, largest: np.ndarray) -> float | None:
+    """Day from which on less than `LEFT` of the largest excess pore pressure is left for good, or None if it is not over.
+
+    Args:
+        days: (n,) of the history.
+        largest: excess pore pressure in the ground (n,) [Pa].
+    """
+    wet = np.flatnonzero(largest > LEFT * largest.max(initial=0.0))
+    return float(days[wet[-1] + 1]) if len(wet) and wet[-1] + 1 < len(days) else None
+
+
 def save_over_time(
     path: Path,
     days: np.ndarray,
@@ -144,14 +188,18 @@ def save_over_time(
     downward: bool = False,
     particles: Mapping[str, np.ndarray] | None = None,
     stages: Sequence[float] = (),
+    logarithmic: bool = True,
+    primary: float | None = None,
 ) -> None:
     """Curves over the time, by name; particles: values beside those of the same name, as open marks.
 
     downward: with the vertical axis turned over, as for settlements
-    stages: days at which further stages begin, which are marked; without any the time is on a logarithmic scale
+    stages: days at which further stages begin, which are marked
+    logarithmic: scale of the time
+    primary: day at which primary consolidation is complete, between it and secondary compression; None to mark none
     """
     with curve_figure(path, (4.9, 3.3)) as axes:
-        if not stages:
+        if logarithmic:
             axes.set_xscale("log")
         for day in stages:
             axes.axvline(day, color="0.75", linewidth=0.7, linestyle="--", zorder=0)
@@ -164,5 +212,9 @@ def save_over_time(
         axes.set(xlabel="Time [days]", ylabel=label)
         if downward:
             axes.invert_yaxis()
+        if primary is not None:
+            axes.axvline(primary, color="0.35", linewidth=0.9, linestyle=":", zorder=0)
+            for side, word in (("right", "primary "), ("left", " secondary")):
+                axes.annotate(word, (primary, 0.97), xycoords=("data", "axes fraction"), ha=side, va="top", fontsize=8)
         if len(curves) > 1 or particles:
             axes.legend(fontsize=8)
