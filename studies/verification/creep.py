@@ -1,9 +1,9 @@
 """Creep of soft clay: settlement by the logarithm of time, strength by the rate, and a layer that consolidates and creeps.
 
-The law is modified Cam-Clay with isotaches. A point creeps under a constant pressure, relaxes at a constant volume, and is sheared without drainage at
-several rates. The layer of `meshes/soft_clay.toml`, 5 m thick, settles under a wide fill by finite elements, with three conductivities. Once the water is
-out, it settles by creep / v for each factor e of time, and where its water leaves more slowly it has crept as much by then as in the other cases: the final
-settlement hardly depends on the conductivity (hypothesis B of Leroueil 2006).
+The law is modified Cam-Clay with isotaches. A point creeps under a constant pressure and under shear stresses up to the critical state, relaxes at a constant
+volume, and is sheared without drainage at several rates. The layer of `meshes/soft_clay.toml`, 5 m thick, settles under a wide fill by finite elements, with three
+conductivities. Once the water is out, it settles by creep / v for each factor e of time, and where its water leaves more slowly it has crept as much by then as in
+the other cases: the final settlement hardly depends on the conductivity (hypothesis B of Leroueil 2006).
 """
 
 import numpy as np
@@ -41,6 +41,26 @@ def crept(days, steps):
         test.step([None, None, None, 0, 0, 0], [-PRESSURE] * 3 + [0.0] * 3, dt=end - time)
         time = end
     return VOLUME * (1 - np.exp(test.strain[:3].sum()))
+
+
+def sheared(ratio, days, steps):
+    """Volumetric and shear strain by creep under a constant q / p, on the ellipse of the preconsolidation pressure."""
+    p = PRESSURE / (1 + (ratio / SLOPE) ** 2)
+    stress = [-p * (1 + 2 / 3 * ratio), -p * (1 - ratio / 3), -p * (1 - ratio / 3), 0.0, 0.0, 0.0]
+    test, time = mpm.ElementTest(clay(), stress), 0.0
+    for end in np.geomspace(1e-3, days, steps) * DAY:
+        test.step([None, None, None, 0, 0, 0], stress, dt=end - time)
+        time = end
+    return -test.strain[:3].sum(), 2 / 3 * (test.strain[1] - test.strain[0])
+
+
+def sheared_by_hand(ratio, days):
+    """v falls by creep ln(1 + a t / day), a = 1 - (q / (M p))^2, and the shear strain is 2 r / (M^2 - r^2) times that of volume; at q = M p it has a constant rate."""
+    a = 1 - (ratio / SLOPE) ** 2
+    if a == 0:
+        return 0.0, 2 * CREEP * days / (SLOPE * VOLUME)
+    volumetric = -np.log(1 - CREEP * np.log(1 + a * days) / VOLUME)
+    return volumetric, volumetric * 2 * ratio / (SLOPE**2 - ratio**2)
 
 
 def relaxed(days, steps):
@@ -92,7 +112,7 @@ def layer(folder, conductivity, creep, days, growth):
             rows.append((model.time / DAY, comm.allreduce(-top.min(initial=0.0), MPI.MAX)))
 
     for time in (30.0, days):  # the fill is complete after 30 days
-        model.run(DAY * time, DAY, growth, progress=made)
+        model.run(DAY * time, DAY, growth, progress=made, accuracy=0.01)
     return np.array(rows).T
 
 
@@ -110,6 +130,21 @@ def run(quick: bool, folder) -> Result:
         Check("volume lost under the preconsolidation pressure in 100 days", CREEP * np.log(101), "creep ln(1 + t / day)", crept(100, steps), 0.02),
         Check("pressure left at constant volume after 100 days", relaxed_by_hand(100) / 1e3, "isotaches", relaxed(100, steps) / 1e3, 5e-3, "kPa"),
     ]  # fmt: skip
+    for ratio in (0.5 * SLOPE, 0.9 * SLOPE):
+        for name, hand, one in zip(
+            ("volumetric", "shear"), sheared_by_hand(ratio, 100), sheared(ratio, 100, steps), strict=True
+        ):
+            checks.append(
+                Check(
+                    f"{name} strain under a constant q / p of {ratio:g} in 100 days",
+                    hand,
+                    "isotaches, flow normal to the ellipse",
+                    one,
+                    0.02,
+                )
+            )
+    checks.append(Check(f"shear strain under a constant q / p of {SLOPE:g} in 10 days", sheared_by_hand(SLOPE, 10)[1], "2 creep / (M v) for each day",
+                        sheared(SLOPE, 10, steps)[1], 1e-3))  # fmt: skip
     rates = np.array([1e-8, 1e-6, 1e-4])
     found = np.array([strength(rate, steps) for rate in rates])
     checks += [
