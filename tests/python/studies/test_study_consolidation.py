@@ -456,51 +456,6 @@ def test_the_pressure_between_smooth_plates_rises_as_mandel_says():
     assert rise[1] == pytest.approx(1.1555, rel=0.02) and rise[0] < 1.08
 
 
-def test_soft_clay_creeps_on_when_its_water_is_out(tmp_path):
-    """By creep / v times the height for each factor e of time, in `meshes/soft_clay.toml`; without creep not at all."""
-    from common.consolidation.site import read_consolidation_site
-
-    from fenics_bridge import water
-
-    slope = {}
-    for creep in (0.01, 0.0):
-        text = f'extends = "{STUDIES.parent}/meshes/soft_clay.toml"\ncell_size = 1.0\n[soils.clay]\nconductivity = 1e-6\ncreep = {creep}\n'
-        (tmp_path / "site.toml").write_text(text)
-        site = read_consolidation_site(tmp_path / "site.toml", MPI.COMM_SELF)
-        model = site.at_rest(water.Element.TAYLOR_HOOD)
-        settled = []
-        for days in (2e3, 2e4):
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # coarse cells, large strains
-                assert model.run(86400.0 * days, 86400.0, 1.4)[-1].converged
-            settled.append(-model.displacement.x.array.min())
-        slope[creep] = (settled[1] - settled[0]) / np.log(10)
-        volume = 2.6 * np.exp(-np.mean(settled) / 5)
-    assert slope[0.01] == pytest.approx(0.01 / volume * 5, rel=0.1)  # the volume is that without creep
-    assert abs(slope[0.0]) < 1e-5
-
-
-def test_soft_clay_settles_without_any_load(tmp_path):
-    """Where its overconsolidation ratio is 1, from 1000 to 30000 days by creep / v ln(30) times the height. Such ground is not said to be at rest."""
-    from common.consolidation.site import read_consolidation_site
-
-    from fenics_bridge import water
-
-    path = tmp_path / "site.toml"
-    path.write_text(
-        f'extends = "{STUDIES.parent}/meshes/soft_clay.toml"\ncell_size = 1.0\n[soils.clay]\nconductivity = 1e-6\noverconsolidation = 1.0\nk0 = 0.6\n'
-        "[pressures]\ntop = 0.0\n"
-    )
-    site = read_consolidation_site(path, MPI.COMM_SELF)
-    assert site.changes_until(86400.0)
-    model, found = site.at_rest(water.Element.TAYLOR_HOOD), []
-    for days in (1e3, 3e4):
-        assert model.run(86400.0 * days, 86400.0, 1.2)[-1].converged
-        found.append(-model.displacement.x.array.min())
-    height, volume = 5.0, 2.6 * np.exp(-np.mean(found) / 5.0)
-    assert found[1] - found[0] == pytest.approx(0.01 / volume * np.log(30) * height, rel=0.02)
-
-
 @pytest.mark.parametrize("width", [0.5, 20.0])
 def test_settlements_of_more_than_a_tenth_of_the_height_are_warned_of_and_are_no_collapse(tmp_path, width):
     from common.consolidation.site import read_consolidation_site
