@@ -125,13 +125,14 @@ Start<T> start_of(const Clay& clay, const PointBatch<D>& points, Index i, Deviat
   deviators = {deviator<D>(stress), deviator<D>(strain)};
   const auto exponential = [&](std::size_t k)
   { return each(load_as<T>(points.state[k] + i), [](double x) { return std::exp(x); }); };
-  const T volume = clay.volume * exponential(2);
+  const T volume = clay.volume * exponential(2), log_volume = 3 * mean<D>(strain);
   return {clay,
           volume / clay.swelling,
           volume / clay.difference,
           clay.attraction - mean<D>(stress),
           clay.preconsolidation * exponential(1),
-          -3 * mean<D>(strain),
+          -log_volume * growth_of<T>(log_volume).mean,
+          log_volume,
           square_along<D>(deviators.stress, deviators.strain)};
 }
 
@@ -141,7 +142,7 @@ Mask<T> is_sound(const Start<T>& a, const Result<T>& trial)
 {
   constexpr double most = 1e100; // [Pa] beyond which squares and cubes might overflow
   return (a.pressure > 0) & (trial.pressure < most) & (trial.square < most * most) & (a.preconsolidation > 0) &
-         (a.preconsolidation < most) & (absolute(a.volumetric) < 1);
+         (a.preconsolidation < most) & (absolute(a.log_volume) < 1);
 }
 
 /// Whether an elastic result lies outside of the yield surface; a stress that was returned does not.
@@ -165,7 +166,7 @@ void write(const Start<T>& a, const Result<T>& r, const Deviators<D, T>& deviato
   add_to_state<D, T>(points, i, 0, 2 * r.multiplier * r.ratio * q / a.clay.slope_squared);
   const T softest = (T{} + std::log(2 * least_pressure)) - load_as<T>(points.state[1] + i); // critical at that pressure
   add_to_state<D, T>(points, i, 1, larger(a.plastic * r.x, softest));
-  add_to_state<D, T>(points, i, 2, -a.volumetric);
+  add_to_state<D, T>(points, i, 2, a.log_volume);
 }
 
 /// Whether soil creeps in increments of this duration
@@ -226,7 +227,8 @@ Outcome update_point(const Clay& clay, const PointBatch<D>& points, Index i, dou
   write(a, result, deviators, points, i);
   if (tangent)
     write_secant_tangent<D>(secant_trial<D>(result.shear, deviators.stress, deviators.strain), deviators.strain,
-                            result.ratio, slopes(a, result, plastic, 1, 0), slopes(a, result, plastic, 0, 1), tangent);
+                            result.ratio, slopes(a, result, plastic, 1 - a.volumetric, 0),
+                            slopes(a, result, plastic, 0, 1), tangent);
   return plastic ? Outcome::plastic : Outcome::elastic;
 }
 

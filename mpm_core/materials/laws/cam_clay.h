@@ -11,8 +11,9 @@ namespace mpm::materials
 /// pressure p_c (attraction included) a stress is admissible when
 ///     q^2 / M^2 + p (p - p_c) <= 0.
 /// The flow is associated; p_c hardens by dp_c / p_c = -v / (compression - swelling) de_v^p. Elasticity has the bulk
-/// modulus K = v p / swelling and a constant Poisson's ratio. The specific volume v is that at the start of each
-/// increment. Soil that loosens keeps a pressure of 1e-4 p_c of the start.
+/// modulus K = v p / swelling and a constant Poisson's ratio. Over an increment v falls by
+/// swelling d(ln p) + (compression - swelling) d(ln p_c), however large it is. Soil that loosens keeps a pressure of
+/// 1e-4 p_c of the start.
 ///
 /// With creep mu no stress is inadmissible. With p_eq = p + q^2 / (M^2 p), the size of the ellipse through the stress,
 /// soil flows all the time, normal to that ellipse, by

@@ -162,7 +162,7 @@ Result<N> creep_result(const Start<N>& a, const CreepAt<N>& at)
   return result_of<N>(a, chosen<N>(at.creeps, at.x, N{}), chosen<N>(at.creeps, multiplier, N{}));
 }
 
-/// Derivatives of the new stress by the volumetric strain, and by q of the trial
+/// Derivatives of the new stress by the strain that changes the volume, and by q of the trial
 inline std::array<SecantSlopes, 2> creep_slopes(const Start<double>& a, const CreepAt<double>& at)
 {
   using T = Dual<4>;
@@ -175,7 +175,9 @@ inline std::array<SecantSlopes, 2> creep_slopes(const Start<double>& a, const Cr
   {
     const double x = at.creeps ? (f[1] * r[by] - r[1] * f[by]) / determinant : 0.0;
     const double l = at.creeps ? (r[0] * f[by] - f[0] * r[by]) / determinant : 0.0;
-    const auto total = [&](const T& number) { return number.slopes[by] + number.slopes[0] * x + number.slopes[1] * l; };
+    const double per_strain = by == 2 ? 1 - a.volumetric : 1.0; // which is a logarithm
+    const auto total = [&](const T& number)
+    { return per_strain * (number.slopes[by] + number.slopes[0] * x + number.slopes[1] * l); };
     return SecantSlopes{total(end.pressure), total(end.shear), total(end.ratio)};
   };
   return {slopes(2), slopes(3)};

@@ -22,7 +22,8 @@ struct Clay
 };
 
 /// A point at the start of an increment, and the increment: pressures and volumetric strains are positive in
-/// compression here. Numbers of one point or, as `Lanes`, of a few side by side.
+/// compression here. Volumetric strains are the specific volume that is lost over that of the start, so that it follows
+/// lambda, kappa and mu in increments of any size. Numbers of one point or, as `Lanes`, of a few side by side.
 template <class T>
 struct Start
 {
@@ -30,7 +31,8 @@ struct Start
   T elastic, plastic;      ///< v / kappa and v / (lambda - kappa)
   T pressure;              ///< p
   T preconsolidation;      ///< p_c
-  T volumetric;            ///< volumetric strain increment
+  T volumetric;            ///< volumetric strain increment, 1 - v_end / v
+  T log_volume;            ///< ln(v_end / v)
   std::array<T, 3> square; ///< q^2 of the trial deviator s + 2 G e by 2 G, with the secant modulus G
 };
 
