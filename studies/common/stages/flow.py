@@ -14,13 +14,15 @@ from mpi4py import MPI
 import fenics_bridge as bridge
 import mpm_core as mpm
 from fenics_bridge import water
+from fenics_bridge.fem.supports import tagged_facets
+from fenics_bridge.mesh.tagged import tag_values
 from fenics_bridge.water.soils import WATER_WEIGHT
 
 from ..checks import say
 from ..site.doubts import warn_of_heads, warn_of_reservoirs
 from ..site.flow import boundaries_of_stage, boundary_of, wet_soils
 from ..site.flow_doubts import warn_of_kept_flow, warn_of_low_reservoirs, warn_of_sealed_ground
-from ..water.discharge import exit_gradients, extent_of, in_words, inflows
+from ..water.discharge import exit_gradients, exit_gradients_by_boundary, extent_of, in_words, inflows
 
 
 @dataclass
@@ -28,11 +30,13 @@ class StageFlow:
     """Steady flow of a stage.
 
     pressure: function of positions that returns the pore pressures; reservoirs: each with its ground, (condition, x, y) [m]
+    cell_tags: soils through which it flows
     """
 
     flow: water.Seepage
     pressure: Any
     reservoirs: list[tuple]
+    cell_tags: Any = None
 
     def __call__(self, points: np.ndarray) -> Any:
         """Pore pressures (n,) [Pa] at positions (n, D) [m]; in front of walls those of the reservoirs there. Collective."""
@@ -66,17 +70,46 @@ def flow_lines(stage: str, pressure: Any) -> list[str]:
     return [f"inflow in the steady flow of {stage!r}, {name}: {value}" for name, value in zip(names, found)]
 
 
-def warn_of_heave(row: Mapping[str, Any], unit_weights: Sequence[float]) -> None:
+def upward_exits(pressure: Any, unit_weight: Mapping[Any, float]) -> dict[str, tuple[float, float]]:
+    """Largest gradient with which water leaves upwards at each boundary that lets it out, and the least unit weight [N/m3] of the soil there. Collective.
+
+    Args:
+        pressure: pore pressures of the stage; there are boundaries where they are a StageFlow.
+        unit_weight: by the tags of the soils that are there [N/m3].
+    """
+    if not isinstance(pressure, StageFlow):
+        return {}
+    flow, tags = pressure.flow, tag_values(
+        pressure.flow.domain, pressure.cell_tags, pressure.flow.domain.topology.dim
+    )
+    found = {}
+    for name, gradient in exit_gradients_by_boundary(flow, upward=True).items():
+        beside = cells_beside(flow.domain, tagged_facets(flow.domain.comm, flow.facet_tags, name, "boundary"))
+        least = min((unit_weight[tag] for tag in np.unique(tags[beside])), default=np.inf)
+        found[name] = gradient, flow.domain.comm.allreduce(float(least), MPI.MIN)
+    return found
+
+
+def cells_beside(domain: Any, facets: np.ndarray) -> np.ndarray:
+    """Cells of this rank that have some of its facets."""
+    dim = domain.topology.dim
+    domain.topology.create_connectivity(dim - 1, dim)
+    links = domain.topology.connectivity(dim - 1, dim)
+    return np.unique(np.concatenate([np.empty(0, np.int32), *(links.links(facet) for facet in facets)])).astype(int)
+
+
+def warn_of_heave(stage: str, exits: Mapping[str, tuple[float, float]]) -> None:
     """Warn where water leaves upwards with a gradient that lifts soil without cohesion.
 
     Args:
-        row: results of a stage, with those of `flow_row`.
-        unit_weights: of the soils that are there [N/m3].
+        stage: its name.
+        exits: of `upward_exits`.
     """
-    gradient, critical = row.get("largest_upward_exit_gradient", 0.0), min(unit_weights) / WATER_WEIGHT - 1
-    if gradient > max(critical, 0.0):  # where no water leaves upwards, soil that is lighter than water is there too
-        say(f"stage {row['stage']!r}: water leaves the ground upwards with a gradient of {gradient:.2f}, above the critical one of "
-            f"{critical:.2f} of soil of {min(unit_weights) / 1e3:.3g} kN/m3: it lifts soil without cohesion (hydraulic heave)")  # fmt: skip
+    for name, (gradient, weight) in exits.items():
+        critical = weight / WATER_WEIGHT - 1
+        if gradient > max(critical, 0.0):  # where no water leaves upwards, soil that is lighter than water is there too
+            say(f"stage {stage!r}: water leaves the ground upwards with a gradient of {gradient:.2f} at {name!r}, above the critical one of "
+                f"{critical:.2f} of soil of {weight / 1e3:.3g} kN/m3: it lifts soil without cohesion (hydraulic heave)")  # fmt: skip
 
 
 def with_steady_flow(
@@ -180,7 +213,7 @@ def _flow(
     reservoirs = [(one, *line) for one in acting if isinstance(one, water.Reservoir)
                   for line in water.ground_lines(body, facets, one.facet_tag)]  # fmt: skip
     outside = water.reservoir_pressure(body, facets, acting) if reservoirs else None
-    return StageFlow(flow, flow.pore_pressure(outside=outside), reservoirs)
+    return StageFlow(flow, flow.pore_pressure(outside=outside), reservoirs, cells)
 
 
 def _at_surface(body: Any, facets: Any) -> Any:

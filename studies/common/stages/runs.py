@@ -24,7 +24,7 @@ from ..site.names import mistakes_in
 from ..site.options import add_site_file
 from ..solids.member_forces import force_picture
 from ..solids.stages import solid_stage, solid_stage_pictures
-from .flow import flow_row, warn_of_heave
+from .flow import flow_row, upward_exits, warn_of_heave
 from .plots import StageFiles, first_shown, stage_picture, stage_pictures
 from .surface import surface_rows
 
@@ -92,7 +92,8 @@ def carry_out(site: Site, degree: int, folder: Path, comm: MPI.Comm, **options: 
                              "largest_displacement_m": report.largest_displacement, **flow_row(run.site.state.pore_pressure), **force_row(run.site.fem.members, run.forces[-1].forces)})  # fmt: skip
             if stage.deconfinement < 1:
                 run.rows[-1]["deconfinement"] = stage.deconfinement
-            warn_of_heave(run.rows[-1], [run.site.state.unit_weight[tag] for tag in run.site.state.there])
+            state = run.site.state
+            warn_of_heave(report.name, upward_exits(state.pore_pressure, state.unit_weight))
             picture = (stage_picture if site.dimension == 2 else solid_stage)(run.site, report.name)
             if picture is not None:
                 run.pictures.append(picture)

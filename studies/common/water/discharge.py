@@ -48,7 +48,13 @@ def inflows(flow: water.Seepage, names: Iterable[str]) -> dict[str, float]:
 
 
 def exit_gradients(flow: water.Seepage) -> dict[str, float]:
-    """Largest gradient [-] with which water leaves, and its largest upward component, which lifts soil. Collective.
+    """Largest gradient [-] with which water leaves, and its largest upward component, which lifts soil. Collective."""
+    return {key: max(exit_gradients_by_boundary(flow, upward).values(), default=0.0)
+            for key, upward in (("largest_exit_gradient", False), ("largest_upward_exit_gradient", True))}  # fmt: skip
+
+
+def exit_gradients_by_boundary(flow: water.Seepage, upward: bool) -> dict[str, float]:
+    """Largest gradient [-] with which water leaves at each boundary, or its largest upward component. Collective.
 
     Boundaries at which a flux lets no water leave do not count: at the tip of a sheet pile the gradient beside the ground is singular.
     """
@@ -56,8 +62,7 @@ def exit_gradients(flow: water.Seepage) -> dict[str, float]:
         one for one in flow.boundary if not (isinstance(one, water.Flux) and value_at(one.rate, flow.time) >= 0)
     ]
     tags = list(dict.fromkeys(one.facet_tag for one in lets_out))
-    return {key: max((water.exit_gradient(flow, tag, upward) for tag in tags), default=0.0)
-            for key, upward in (("largest_exit_gradient", False), ("largest_upward_exit_gradient", True))}  # fmt: skip
+    return {str(tag): water.exit_gradient(flow, tag, upward) for tag in tags}
 
 
 def in_words(found: Mapping[str, float], extent: Extent) -> dict[str, str]:

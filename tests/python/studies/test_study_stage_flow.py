@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from common.site.file import read_site
 from common.site.flow_doubts import warn_of_sealed_ground
-from common.stages.flow import StageFlow, warn_of_heave
+from common.stages.flow import StageFlow, upward_exits, warn_of_heave
 from common.stages.plots import stage_picture
 from mpi4py import MPI
 from study_main import main
@@ -104,7 +104,11 @@ def test_a_head_beside_soil_without_water_is_named(tmp_path):
     [
         ("steady_flow = true", "steady_flow = 1", r"stages\[0\]: steady_flow is 1, expected true or false"),
         ("steady_flow = true", "steady_flow = true\nwater_level = 2.0", r"stages\[0\] has steady_flow and water_level"),
-        ("head = 23.0", "head = 23.0\n[boundaries.wall]\nhead = 3.0", r"boundaries.wall: no boundary of the mesh .* has the name 'wall'"),
+        (
+            "head = 23.0",
+            "head = 23.0\n[boundaries.wall]\nhead = 3.0",
+            r"boundaries.wall: no boundary of the mesh .* has the name 'wall'",
+        ),
         ("conductivity = 1e-4", "", r"stages\[0\]: steady_flow is true, but no soil with a conductivity is there"),
         (
             "[boundaries.right]  # the groundwater far from the pit\nhead = 23.0",
@@ -185,16 +189,27 @@ def test_the_study_seepage_flows_around_walls(tmp_path):
     assert 0 < inflows[1] < 0.85 * inflows[0]
 
 
-@pytest.mark.parametrize(("sideways", "upward", "said"), [(1.5, 0.2, False), (1.5, 1.2, True)])
-def test_water_that_leaves_sideways_lifts_no_soil(sideways, upward, said, recwarn):
-    """The critical gradient of soil of 20 kN/m3 is 20 / 9.81 - 1 = 1.04."""
-    row = {"stage": "cut", "largest_exit_gradient": sideways, "largest_upward_exit_gradient": upward}
-    warn_of_heave(row, [20e3])
-    assert any("hydraulic heave" in str(one.message) for one in recwarn) == said
+@pytest.mark.parametrize(("upward", "said"), [(0.2, False), (1.0, False), (1.1, True)])
+def test_soil_is_lifted_above_its_critical_gradient(upward, said, recwarn):
+    """That of soil of 20 kN/m3 is 20 / 9.81 - 1 = 1.04."""
+    warn_of_heave("cut", {"floor": (upward, 20e3)})
+    assert any("at 'floor', above the critical one of 1.04" in str(one.message) for one in recwarn) == said
 
 
-@pytest.mark.parametrize("row", [{}, {"largest_exit_gradient": 0.5, "largest_upward_exit_gradient": 0.0}])
-def test_no_water_that_leaves_upwards_lifts_no_soil_that_is_lighter_than_water(row, recwarn):
+@pytest.mark.parametrize("weight", [300.0, 0.0])
+def test_no_water_that_leaves_upwards_lifts_no_soil_that_is_lighter_than_water(weight, recwarn):
     """Weightless soil of a hand calculation, or blocks of foam of 0.3 kN/m3 in a dry fill, have a critical gradient below 0."""
-    warn_of_heave({"stage": "load", **row}, [20e3, 300.0, 0.0])
+    warn_of_heave("load", {"floor": (0.0, weight)})
     assert not [one for one in recwarn if "hydraulic heave" in str(one.message)]
+
+
+def test_the_soil_at_the_floor_is_what_water_lifts_there(tmp_path):
+    """Soil that is lighter elsewhere does not count: the peat of the first cut is gone from the floor of the second."""
+    text = TEXT.replace('[soils."cut 1"]\nunit_weight = 20e3', '[soils."cut 1"]\nunit_weight = 11e3')
+    site = read_site(site_in(tmp_path, text), MPI.COMM_WORLD)
+    weights = {tag: site.unit_weight[soil] for soil in site.soils for tag in site.tags_of([soil])}
+    exits = [upward_exits(stage.pore_pressure, weights) for stage in site.stages]
+    assert [list(one) for one in exits] == [["right"], [], ["right", "floor 1"], ["right", "floor 2"]]
+    assert exits[0]["right"] == (pytest.approx(0.0, abs=1e-9), 20e3)
+    assert exits[2]["floor 1"][1] == 20e3 and exits[3]["floor 2"][1] == 20e3
+    assert 0.2 < exits[3]["floor 2"][0] < 0.6
