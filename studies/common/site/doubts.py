@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from dolfinx.mesh import exterior_facet_indices
-from mpm_core.input_warnings import HEAVIEST_RAIN, fast_flow
+from mpm_core.input_warnings import HEAVIEST_RAIN, LARGEST_CONDUCTIVITY, fast_flow
 
 import fenics_bridge as bridge
 from fenics_bridge import water
@@ -39,6 +39,9 @@ LIGHTEST = 1e3
 
 STANDING, STEEPEST = 0.02, 0.01
 """Depth of water over the height of a mesh from which on it stands on the ground, and slope of a level that may be rounded"""
+
+COARSEST = 0.1
+"""Conductivity [m/s] above which it is of rock fill or clean coarse gravel, or in m/day, in which fine sand has 0.1 to 1"""
 
 LOOSEST = 1e-5
 """Compressibility [1/Pa] above which it is probably in other units, or a modulus"""
@@ -239,6 +242,9 @@ def warn_of_flow(soil: water.PorousSoil, where: str) -> None:
     """Warn of a conductivity or compressibility that is probably in other units; where: the soil stands in the file."""
     largest = np.linalg.eigvalsh(soil.tensor(soil.conductivity, 2)).max()
     say(fast_flow(f"{where}: conductivity", float(largest)))
+    if COARSEST < largest <= LARGEST_CONDUCTIVITY:
+        say(f"{where}: conductivity is {largest:g} m/s, that of rock fill or clean coarse gravel; conductivities are in m/s, and {largest:g} m/day are "
+            f"{largest / DAY:.3g} m/s")  # fmt: skip
     if soil.compressibility > LOOSEST:
         say(f"{where}: compressibility is {soil.compressibility:g} 1/Pa, of an oedometric modulus of {1 / soil.compressibility:.3g} Pa, which "
             "hardly any soil has: compressibilities are in 1/Pa, such as 1e-7 for a modulus of 10 MPa")  # fmt: skip

@@ -65,6 +65,7 @@ from .laws import (
     unit_weight_of,
 )
 from .law_doubts import DOUBTS
+from .member_doubts import warn_of_pulling_struts
 from .mesh import check_soils, geometry_of, site_mesh
 from .names import mistakes_in, require_soils
 from .stages import stage_of, warn_of_held
@@ -335,6 +336,7 @@ def site_of(
             f"{path}: no stage fills the cells of {names}, which therefore hold no soil; name it in fill of a stage where it is there"
         )
     warn_of_buoyant_weight(weights, rows, path)
+    warn_of_pulling_struts(site)
     site.stages = from_the_beginning(site.stages, site, begins_later or not rows or "day" not in rows[0], path)
     site.stages = with_strength_ratios(site.stages, site, table.get("laws", {}), path)
     if beside.walls:

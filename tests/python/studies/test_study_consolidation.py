@@ -29,7 +29,11 @@ SITE = (STUDIES.parent / "meshes" / "fill.toml").read_text()
         ("[10.0, 20e3]", "[10.0, nan]", "pressures.footing is .*expected finite numbers"),
         ("[10.0, 20e3]", "[10.0, -20e3]", "pressures.footing is -20000 Pa, expected at least 0: a pressure pushes"),
         ("[10.0, 20e3]", "[10.0]", "pressures.footing is .*expected a number or rows"),
-        ("footing = [[0.0, 0.0]", "nowhere = [[0.0, 0.0]", "pressures.nowhere: no boundary of the mesh .* has the name 'nowhere'; it has "),
+        (
+            "footing = [[0.0, 0.0]",
+            "nowhere = [[0.0, 0.0]",
+            "pressures.nowhere: no boundary of the mesh .* has the name 'nowhere'; it has ",
+        ),
         ("middle = [0.0, 0.0]", "middle = [0.0]", r"points.middle is .*expected \[x, y\]"),
         ("[points]", "[places]", "unknown key 'places'"),
         (
@@ -57,6 +61,9 @@ def test_a_wrong_site_is_named(old, new, words, tmp_path):
         ("conductivity = 1e-9", "conductivity = [1e-9, 8.64]", "soils.soil: conductivity is 8.64 m/s, more than that of gravel"),
         ("[boundaries.footing]\nreservoir = 0.5", "[boundaries.footing]\nreservoir = [[0.0, 0.5], [1.0, 100.0]]",
          "the reservoir of 'footing' is 100 m, 100 m above the top of the mesh, which is 6 m high"),
+        ("conductivity = 1e-9", "conductivity = 0.5",
+         "soils.soil: conductivity is 0.5 m/s, that of rock fill or clean coarse gravel; conductivities are in m/s, and 0.5 m/day are 5.79e-06 m/s"),
+        ("conductivity = 1e-9", "conductivity = 0.09", ""),
         ("[boundaries.footing]\nreservoir = 0.5", "[boundaries.footing]\nreservoir = 18.0", ""),  # deep water
         ("[10.0, 20e3]", "[10.0, 20.0]", "pressures.footing is 20 Pa, less than under 0.1 m of soil: 20 kPa are 20e3"),
     ],

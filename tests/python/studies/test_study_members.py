@@ -160,6 +160,33 @@ def test_a_factor_by_particles_has_the_members_of_a_site_without_stages(tmp_path
     assert list(seen[0].members) == list(site.members) and len(site.members) == 6
 
 
+@pytest.mark.parametrize(
+    ("new", "said"),
+    [
+        ("prestress = 20e3", True),
+        ("prestress = 20e3\ncompressive_strength = 0.0", False),  # a cable
+        ("prestress = -20e3", False),
+    ],
+)
+def test_a_strut_that_pulls_at_its_wall_is_doubted(new, said, recwarn, tmp_path):
+    text = SITE.replace("tensile_strength = 0.0  # it is only pressed against the wall\nprestress = -20e3", new)
+    site_file.read_site(site_in(tmp_path, text), MPI.COMM_WORLD, 2.0)
+    found = [str(one.message) for one in recwarn if "by which the strut pulls" in str(one.message)]
+    assert len(found) == said and all(
+        "members.upper strut: prestress is 20000 N/m, a tension" in text for text in found
+    )
+
+
+def test_a_strut_in_soil_is_the_free_length_of_an_anchor(recwarn, tmp_path):
+    line = "points = [[5.0, 19.0], [0.0, 19.0]]\naxial_stiffness = 0.7e9  # N/m\ntensile_strength = 0.0  # it is only pressed against the wall\nprestress = -20e3"
+    anchor = line.replace("[0.0, 19.0]", "[12.0, 14.0]").replace(
+        "tensile_strength = 0.0  # it is only pressed against the wall\nprestress = -", "prestress = "
+    )
+    assert line in SITE
+    site_file.read_site(site_in(tmp_path, SITE.replace(line, anchor)), MPI.COMM_WORLD, 2.0)
+    assert not [one for one in recwarn if "by which the strut pulls" in str(one.message)]
+
+
 def test_a_member_that_no_stage_installs_is_named(tmp_path):
     text = SITE.replace('install = ["lower strut"]\n', "")
     with pytest.warns(RuntimeWarning, match="no stage installs 'lower strut', which therefore is not there"):
