@@ -196,6 +196,8 @@ def _python_law(text: str) -> Any:
         raise mpm.InputError(f"--python-law is '{text}', but the file {file} does not exist")
     sys.path.insert(0, str(Path(file).parent))  # for what it imports beside it
     spec = importlib.util.spec_from_file_location("law_of_the_user", file)
+    if spec is None or spec.loader is None:
+        raise mpm.InputError(f"--python-law is '{text}', expected a file of Python, whose name ends in .py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     if not hasattr(module, name):

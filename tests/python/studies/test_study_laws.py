@@ -281,3 +281,11 @@ def test_retrogression_is_at_rest_where_nothing_moves(energies, at_rest):
     study = importlib.import_module("retrogression")
     history = {"time_s": np.arange(5.0), "kinetic_energy_J_per_m": np.array(energies)}
     assert study.is_at_rest(history, 10e3) == at_rest
+
+
+def test_a_law_that_is_in_no_file_of_python_is_refused(tmp_path):
+    (tmp_path / "mine.txt").write_text("class Spring: ...")
+    text = f"{tmp_path / 'mine.txt'}:Spring"
+    result = ended("element_test", tmp_path / "out", "--python-law", text)
+    assert result.returncode == 2
+    assert f"--python-law is '{text}', expected a file of Python, whose name ends in .py" in result.stderr
