@@ -126,7 +126,7 @@ def take_over(
 
 
 def _support(model: Any, supports: Any, there: Any, reinforced: bool) -> None:
-    """Fix the nodes of the supports, and the nodes without an active cell, at their present displacement; reinforced: as for `_assemble`."""
+    """Fix the nodes of the supports, and those without an active cell, where they are now; reinforced: as for `_assemble`."""
     space = model.displacement.function_space
     constraints = Constraints(space, model.facet_tags, supports, lonely_nodes(space, there))
     constraints.origin[:] = model.displacement.x.array[constraints.dofs]

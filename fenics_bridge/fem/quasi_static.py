@@ -26,7 +26,6 @@ from fenics_bridge.fem.failure import explained, warn_of_motion
 from fenics_bridge.fem.fields import SupportedBody, nodal_average
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.kinematics import Kinematics
-from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.load_steps import LoadStep, raise_load
 from fenics_bridge.fem.loads import Load, LoadVectors, warn_of_weight
 from fenics_bridge.fem.locking import warn_of_laws
@@ -146,7 +145,7 @@ class QuasiStatic(ReinforcedBody, WetBody, SupportedBody, PointFunctions):
         )  # fmt: skip
 
     def _assemble(self, constraints: Constraints, reinforced: bool = False) -> None:
-        """The Body that a step changes, with the present points and the given constraints; reinforced: whether it has members. Collective."""
+        """The Body that a step changes, with the given constraints; reinforced: whether it has members. Collective."""
         require_axis_held(self.displacement.function_space, self.geometry, constraints)
         parts = self.increment, self.points, constraints
         linear = self._linear_solver(reinforced)
@@ -157,11 +156,6 @@ class QuasiStatic(ReinforcedBody, WetBody, SupportedBody, PointFunctions):
         )
         operators = self._kinematics, constraints, linear, self._members
         self._body = Body(self.displacement, self.increment, self.points, *operators)
-
-    def _linear_solver(self, reinforced: bool) -> LinearSolver:
-        """A new solver of linear systems, of a body with or without members. Collective."""
-        space = self.displacement.function_space
-        return LinearSolver(space, self._options_prefix, newton=True, averaged=self._nmd, reinforced=reinforced)
 
     def reconfigure(
         self,

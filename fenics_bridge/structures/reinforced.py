@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 from mpm_core.members import Member, MemberForces
 from mpm_core.petsc import DIRECT_LIMIT
 
 from fenics_bridge.errors import agree
+from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.structures.installed import Members
 from fenics_bridge.structures.member_warnings import warn_of_members
 
@@ -20,7 +20,8 @@ class ReinforcedBody:
     domain: Any
     radius: Any
     _body: Any
-    _linear_solver: Callable[..., Any]
+    displacement: Any
+    _nmd: bool
     _members: Members
     _options_prefix: str
 
@@ -69,6 +70,10 @@ class ReinforcedBody:
             )
         agree(comm, wrong and f"{where}members: {wrong}")
         return self._members.prepared(members, active, where)
+
+    def _linear_solver(self, reinforced: bool) -> LinearSolver:
+        """A new solver of linear systems, of a body of displacements with or without members. Collective."""
+        return LinearSolver(self.displacement.function_space, self._options_prefix, True, self._nmd, reinforced)
 
     def _keeps_factors(self) -> bool:
         """Whether the stiffness stays in factors, to which that of members cannot be added, also where there are some. Collective."""

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 
 def warn_of_pulling_struts(site: Site) -> None:
-    """Warn of struts in the open, as between the walls of a pit, that are installed with a tension: a strut is jacked against walls. Collective.
+    """Warn of struts in the open, as between the walls of a pit, that are installed with a tension. Collective.
 
-    Anchors and ties have soil around them, and a cable has no strength in compression.
+    Struts are jacked against walls. Anchors and ties have soil around them, and a cable has no strength in compression.
     """
     there: list[str] = []
     for stage in site.stages:
@@ -29,8 +29,8 @@ def warn_of_pulling_struts(site: Site) -> None:
         pulling = {name: one for name, one in stage.install.items() if _is_strut(one) and one.prestress > 0}
         for name, is_open in zip(pulling, _in_the_open(site, there, list(pulling.values()))):
             if is_open:
-                say(f"{site.path}: members.{name}: prestress is {pulling[name].prestress:g} N/m, a tension, by which the strut pulls at what it is meant to "
-                    "hold apart; that of a strut which is jacked against walls is a compression, below 0")  # fmt: skip
+                say(f"{site.path}: members.{name}: prestress is {pulling[name].prestress:g} N/m, a tension, by which the strut pulls at what it is "
+                    "meant to hold apart; that of a strut which is jacked against walls is a compression, below 0")  # fmt: skip
 
 
 def _is_strut(member: Member) -> bool:

@@ -13,8 +13,8 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 from ..checks import say
-from .laws import is_number
 from .keys import read_site_table
+from .laws import is_number
 from .names import names_at, require_boundaries
 
 AIR = ("air", "water", "empty")

@@ -71,7 +71,7 @@ def flow_lines(stage: str, pressure: Any) -> list[str]:
 
 
 def upward_exits(pressure: Any, unit_weight: Mapping[Any, float]) -> dict[str, tuple[float, float]]:
-    """Largest gradient with which water leaves upwards at each boundary that lets it out, and the least unit weight [N/m3] of the soil there. Collective.
+    """Largest gradient with which water leaves upwards at each boundary, and the least unit weight [N/m3] of the soil there. Collective.
 
     Args:
         pressure: pore pressures of the stage; there are boundaries where they are a StageFlow.
@@ -79,9 +79,7 @@ def upward_exits(pressure: Any, unit_weight: Mapping[Any, float]) -> dict[str, t
     """
     if not isinstance(pressure, StageFlow):
         return {}
-    flow, tags = pressure.flow, tag_values(
-        pressure.flow.domain, pressure.cell_tags, pressure.flow.domain.topology.dim
-    )
+    flow, tags = pressure.flow, tag_values(pressure.flow.domain, pressure.cell_tags, pressure.flow.domain.topology.dim)
     found = {}
     for name, gradient in exit_gradients_by_boundary(flow, upward=True).items():
         beside = cells_beside(flow.domain, tagged_facets(flow.domain.comm, flow.facet_tags, name, "boundary"))
