@@ -41,6 +41,20 @@ def settlements(picture: StagePicture, rows: np.ndarray) -> tuple[np.ndarray, np
     return picture.displacement.points[rows, 0], -picture.displacement.values[rows, 1]
 
 
+def gaps(picture: StagePicture, rows: np.ndarray) -> np.ndarray:
+    """Whether there is no ground at the surface between each of its points and the next one, as across a pit: (n - 1,)."""
+    cells = picture.displacement.cells[picture.there]
+    return np.array([np.isin(cells, pair).sum(axis=1).max() < 2 for pair in zip(rows, rows[1:])])
+
+
+def is_whole_width(picture: StagePicture, rows: np.ndarray) -> bool:
+    """Whether the points of the surface are those of the whole width of the ground, as they must be to have all of a trough."""
+    x = picture.displacement.points[:, 0]
+    ground = x[picture.displacement.cells[picture.there]]
+    ends = np.allclose(x[rows[[0, -1]]], (ground.min(), ground.max()), rtol=0, atol=LEVEL * np.ptp(ground))
+    return bool(ends and not gaps(picture, rows).any())
+
+
 def tunnel_area(before: StagePicture, now: StagePicture) -> float:
     """Area [m2] in the section of the ground that has been dug away below the surface; 0 where a pit is open to it."""
     dug = before.there & ~now.there
@@ -55,7 +69,8 @@ def tunnel_area(before: StagePicture, now: StagePicture) -> float:
 def surface_rows(pictures: Sequence[StagePicture], first: int) -> list[dict[str, float]]:
     """Results of the surface after each stage: its largest settlement and, of a tunnel, the volume of its trough and the volume loss.
 
-    The volume loss is the volume of the trough over the area of the tunnel, which half of a section has as the whole one does.
+    The volume loss is the volume of the trough over the area of the tunnel, which half of a section has as the whole one does; the trough is that of
+    the half. Below ground that is not level over its whole width neither is known.
 
     Args:
         pictures: of all stages, none but on the first rank.
@@ -69,7 +84,7 @@ def surface_rows(pictures: Sequence[StagePicture], first: int) -> list[dict[str,
         x, settlement = settlements(pictures[k], rows)
         found[k]["surface_settlement_m"] = float(settlement.max())
         area = tunnel_area(pictures[0], pictures[k])
-        if area > 0 and not pictures[k].displacement.half_section:
+        if area > 0 and not pictures[k].displacement.half_section and is_whole_width(pictures[k], rows):
             volume = float(np.sum(np.diff(x) * (settlement[1:] + settlement[:-1]) / 2))
             found[k] |= {"trough_m3_per_m": volume, "volume_loss": volume / area}
     return found
@@ -84,11 +99,17 @@ def surface_lines(row: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def _with_gaps(picture: StagePicture, rows: np.ndarray) -> list[np.ndarray]:
+    """Places and settlements as `settlements`, with NaN between where there is no ground, over which no curve is drawn."""
+    after = 1 + np.flatnonzero(gaps(picture, rows))
+    return [np.insert(values, after, np.nan) for values in settlements(picture, rows)]
+
+
 def surface_picture(pictures: Sequence[StagePicture], folder: Path) -> Pictures:
     """A picture of the settlement of the surface after each stage, downwards; none without level ground, or where nothing moves."""
     rows = surface_points(pictures)
-    curves = {picture.name: settlements(picture, rows) for picture in pictures} if len(rows) else {}
-    if not any(np.any(settlement) for _, settlement in curves.values()):
+    curves = {picture.name: _with_gaps(picture, rows) for picture in pictures} if len(rows) else {}
+    if not any(np.nan_to_num(settlement).any() for _, settlement in curves.values()):
         return {}
 
     def draw() -> None:

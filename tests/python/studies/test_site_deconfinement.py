@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from common.site.file import read_site
 from common.stages.runs import carry_out
-from common.stages.surface import surface_rows
+from common.field_plots import Field
+from common.stages.plots import StagePicture
+from common.stages.surface import surface_picture, surface_rows
 from mpi4py import MPI
 from study_main import ended
 
@@ -63,6 +65,43 @@ def test_a_pit_has_settlements_beside_it_and_no_volume_loss(tmp_path):
     excavation.main(["--site", str(path), "--elements", "P1", "--output", str(tmp_path / "out")])
     last = json.loads((tmp_path / "out" / "summary.json").read_text())["stages"][-1]
     assert "volume_loss" not in last and -0.01 < last["surface_settlement_m"] < 0.01
+
+
+def sections(height, dug, displaced):
+    """Ground 12 m wide of squares of 1 m, below a height in each column, before and after the squares `dug` go and all else moves."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(13.0), np.arange(5.0), indexing="ij"))
+    corner = lambda i, j: 5 * i + j  # noqa: E731
+    squares = [(i, j) for i in range(12) for j in range(4)]
+    halves = [
+        [(corner(i, j), corner(i + 1, j), corner(i + 1, j + 1)), (corner(i, j), corner(i + 1, j + 1), corner(i, j + 1))]
+        for i, j in squares
+    ]
+    cells, points = np.array(halves).reshape(-1, 3), np.column_stack([x, y])
+    there = np.repeat([j < height(i) for i, j in squares], 2)
+    left = there & ~np.repeat([square in dug for square in squares], 2)
+    moved = np.column_stack([np.zeros_like(x), -displaced(x)])
+    return [StagePicture(name, Field(points, cells, values), alive, np.zeros(len(cells)))
+            for name, values, alive in (("in situ", 0 * moved, there), ("tunnel", moved, left))]  # fmt: skip
+
+
+def test_volume_loss_is_that_of_ground_which_is_level_over_its_whole_width():
+    """A trough of 12 m by 0.1 m above a tunnel of 2 m2; below a bank 6 m wide only a part of the trough is at its crest."""
+    tunnel = [(5, 1), (6, 1)]
+    level = surface_rows(sections(lambda i: 4, tunnel, lambda x: 0.1 + 0 * x), 0)[-1]
+    assert level["trough_m3_per_m"] == pytest.approx(1.2) and level["volume_loss"] == pytest.approx(0.6)
+    bank = surface_rows(sections(lambda i: 4 if i < 6 else 3, tunnel, lambda x: 0.1 + 0 * x), 0)[-1]
+    assert bank == {"surface_settlement_m": pytest.approx(0.1)}
+
+
+def test_no_settlement_is_drawn_across_a_pit(monkeypatch, tmp_path):
+    from common import figures
+
+    figure = []
+    monkeypatch.setattr(figures, "save_figure", lambda drawn, path: figure.append(drawn))
+    surface_picture(sections(lambda i: 4, [(5, 3), (6, 3)], lambda x: 0.01 * x), tmp_path)["surface"]()
+    curve = figure[0].axes[0].lines[1].get_xydata()  # of the points that remain
+    assert np.flatnonzero(np.isnan(curve[:, 1])).tolist() == [6]
+    assert curve[[5, 7]] == pytest.approx(np.array([(5.0, 50.0), (7.0, 70.0)]))
 
 
 def test_a_last_stage_that_leaves_forces_held_is_said(tmp_path):
