@@ -190,3 +190,25 @@ def test_a_slope_that_limit_analysis_lets_fail_does_not_stand_by_stiff_cells(tmp
     options = ["--site", path, "--factor", factor, "--time", 5, "--frames", 5, "--output", tmp_path / "slide"]
     assert importlib.import_module("slope").main([str(word) for word in options]) == 0
     assert json.loads((tmp_path / "slide" / "summary.json").read_text())["largest_displacement_m"] > 0.5
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_a_steep_slope_with_little_cohesion_that_averages_do_not_carry_names_the_option(tmp_path):
+    """A slope of 60 degrees in soil of 52 degrees stands in quadratic elements, by a factor below the upper bound of its log-spiral."""
+    path, strength = tmp_path / "slope.toml", (10.0, 60.0, 3e3, 52.0, 19e3)
+    text = (
+        SLOPE.format(mesh=ROOT / "meshes" / "slope.geo")
+        .replace("angle = 45.0", "angle = 60.0")
+        .replace("runout = 25.0", "runout = 5.0")
+    )
+    text = text.replace("cohesion = 12e3", "cohesion = 3e3").replace("friction_angle = 30.0", "friction_angle = 52.0")
+    path.write_text(text.replace("dilation_angle = 30.0", "dilation_angle = 7.0"))
+    site = site_file.read_site(path, MPI.COMM_WORLD)
+    fem = site.finite_elements(2)
+    fem.solve(site.load())
+    assert fem.converged and bridge.log_spiral_safety(*strength) > 1
+    options = ["--site", str(path), "--factor", "1", "--time", "0.01", "--frames", "1", "--output"]
+    slope = importlib.import_module("slope")
+    with pytest.raises(mpm.InputError, match="of their weight only: .* average strains .* take --no-nmd"):
+        slope.main([*options, str(tmp_path / "averaged")])
+    assert slope.main([*options, str(tmp_path / "plain"), "--no-nmd"]) == 0
