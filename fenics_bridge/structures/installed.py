@@ -245,10 +245,9 @@ class Members:
         for at, value in zip(strains.bends_at, one.force[strains.segments :]):
             moment[list(at)] = value
         moved = self._moved(one, displacement) - one.origin
-        hoops = [one.force[rows].copy() for rows in strains.of_hoops] if strains.hoops else (None, None)
-        return MemberForces(
-            one.nodes, moved, one.force[: strains.segments].copy(), moment, *hoops, per_side=one.per_side
-        )
+        hoop_force, hoop_moment = (one.force[rows].copy() if strains.hoops else None for rows in strains.of_hoops)
+        along = one.force[: strains.segments].copy()
+        return MemberForces(one.nodes, moved, along, moment, hoop_force, hoop_moment, one.per_side)
 
     def moved(self, name: str, displacement: NDArray[np.float64]) -> Any:
         """Displacements of a member's nodes, those of the soil before its installation among them (n, D) [m]. Collective.
