@@ -97,7 +97,7 @@ def parser() -> ArgumentParser:
     add_damping(slide)
     add_switch(slide, "--nmd", None, "average volumetric strains over nodes, against locking (default: where the soil locks: "
                "friction angle 0, undrained, Poisson's ratio above 0.45; dilation angle below the friction angle, for implicit "
-               "schemes only if the dilation angle is 0. Not with --paper, and for a site always)")  # fmt: skip
+               "schemes only if the dilation angle is 0. Not with --paper, and for a site wherever its soils then carry their weight)")  # fmt: skip
     add_number(slide, "--time", None, "s", "duration of the slide (default: 16 for a height of 1 m, in proportion to its square "
                "root; 34.8 for the paper's run, a site and quasi-static steps)",
                above=0)  # fmt: skip
@@ -172,8 +172,6 @@ def choose_slide(p: ArgumentParser, options: Namespace) -> None:
     if options.site is not None:  # a run-out in earnest, which damping would shorten (docs/howto/switches.md)
         options.damping = 0.01 if options.damping is None else options.damping
         options.pic = 0.002 if options.pic is None else options.pic
-        # Linear cells are some 20 % too strong without, for any dilation angle, and what fails would stand.
-        options.nmd = True if options.nmd is None else options.nmd
     choose_damping(p, options, local=as_in_paper, mass=5.0 / slowness)
 
 
