@@ -161,7 +161,7 @@ def check_law_options(parser: argparse.ArgumentParser, options: argparse.Namespa
         parser, options, own or options.small_strain_modulus > 0, ("--threshold-strain",), "--small-strain-modulus"
     )
     check_effect(parser, options, own or options.creep > 0, ("--reference-time",), "--creep")
-    if options.material in ("hardening-soil", "cam-clay") and not own:
+    if options.material in ("hardening-soil", "cam-clay", "hoek-brown") and not own:
         with suppress(mpm.InputError):  # said where the law is made
             for doubt in DOUBTS:
                 say(doubt(law_of(options), f"--material {options.material}"))

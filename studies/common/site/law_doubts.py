@@ -9,6 +9,7 @@ import mpm_core as mpm
 from fenics_bridge.fem.overconsolidation import soil_with_history
 
 from .hardening_doubts import secant_doubt, threshold_doubt
+from .rock_doubts import rock_doubt
 from .undrained_doubts import soft_water_doubt
 
 LARGEST = 0.125
@@ -42,5 +43,5 @@ def creep_doubt(law: Any, where: str) -> str:
     return ""
 
 
-DOUBTS = (secant_doubt, threshold_doubt, creep_doubt, soft_water_doubt)
+DOUBTS = (secant_doubt, threshold_doubt, creep_doubt, rock_doubt, soft_water_doubt)
 """Functions of a law, and of where its parameters stand, that return a warning, or an empty text"""

@@ -246,12 +246,7 @@ def is_profile(value: dict) -> bool:
 
 MODULI = ("young", "secant_modulus", "oedometer_modulus", "unloading_modulus", "small_strain_modulus")
 STRESSES = ("preconsolidation", HISTORY, "reference_pressure")
-LEAST = (
-    dict.fromkeys(MODULI, 1e5)
-    | {"intact_strength": 1e5}
-    | dict.fromkeys(STRENGTHS, 50.0)
-    | dict.fromkeys(STRESSES, 1e3)
-)
+LEAST = dict.fromkeys(MODULI, 1e5) | dict.fromkeys(STRENGTHS, 50.0) | dict.fromkeys(STRESSES, 1e3)
 """Parameters [Pa] below which a soil of a site is probably given in kPa or MPa"""
 
 

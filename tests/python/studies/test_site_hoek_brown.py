@@ -1,9 +1,11 @@
 """Sites of rock by Hoek and Brown: the examples of a rock slope and of its slide, doubts about units, laws without effect."""
 
+import pytest
 import study_main  # noqa: F401
 from common.results import ROOT
 from common.site.file import read_site
 from common.site.laws import unit_doubt, without_effect
+from common.site.rock_doubts import rock_doubt
 from mpi4py import MPI
 
 import mpm_core as mpm
@@ -23,9 +25,24 @@ def test_examples_have_their_rock():
     assert bank in weathered.laws.values() and len(weathered.stages) == 2
 
 
-def test_strength_in_mpa_is_doubted():
-    assert "intact_strength is 25 Pa" in unit_doubt(ROCK | {"intact_strength": 25.0}, "soils.bank")
-    assert unit_doubt(ROCK, "soils.bank") == ""
+def rock(**changes):
+    return mpm.HoekBrown(**{key: value for key, value in ROCK.items() if key != "material"} | changes)
+
+
+@pytest.mark.parametrize("strength", [25.0, 200e3, 25e9])
+def test_strength_in_mpa_or_kpa_is_doubted(strength):
+    """Rock has 0.25 MPa (extremely weak, ISRM 1981) to some 400 MPa: 200 MPa in kPa is below, 25e9 Pa above."""
+    law = rock(intact_strength=strength)
+    said = f"soils.bank: intact_strength is {strength:g} Pa, expected that of rock samples"
+    assert said in rock_doubt(law, "soils.bank") and said in rock_doubt(mpm.Undrained(law, porosity=0.1), "soils.bank")
+
+
+def test_a_rock_mass_softer_than_its_samples_are_strong_is_doubted():
+    """Of samples with 200 times their strength the softest rock mass has 0.02, 4 times the strength: 4 * 25 MPa."""
+    assert "bank: young is 3e+06 Pa, less than the intact_strength of 2.5e+07 Pa" in rock_doubt(rock(young=3e6), "bank")
+    assert "young is 3000 Pa" in unit_doubt(ROCK | {"young": 3e3}, "bank") and rock_doubt(rock(young=3e3), "bank") == ""
+    usual = [rock(), rock(young=100e6), rock(intact_strength=0.25e6), rock(intact_strength=400e6)]
+    assert [rock_doubt(law, "bank") for law in (*usual, mpm.LinearElastic(young=1e6, poisson=0.3))] == [""] * 5
 
 
 def test_parameters_of_soil_have_no_effect_on_rock():
