@@ -63,6 +63,14 @@ CHANGES = ("excavate", "law", "unit_weight", "pressure", "support", "release", "
 """What a stage may change beside soils that it places"""
 STAGE_WATER = ("water_level", "steady_flow")
 """Keys of a stage that give it pore pressures"""
+SYMBOLS = {
+    "gsi": "geological_strength_index",
+    **dict.fromkeys(("m_i", "mi"), "intact_constant"),
+    **dict.fromkeys(("sigma_ci", "sigma_c", "ucs"), "intact_strength"),
+    "d": "disturbance_factor",
+    **dict.fromkeys(("relaxation", "relaxation_factor"), "deconfinement"),
+}
+"""Keys by the symbols and other words of the literature, which messages of unknown keys know"""
 
 
 def read_site_table(path: Path, needed: Sequence[str] = ()) -> dict[str, Any]:
@@ -146,7 +154,9 @@ def _require_known(given: Any, known: Collection[str], where: str) -> None:
         given[key.replace("-", "_")] = given.pop(key)
     for key in given:
         if key not in known:
-            raise mpm.InputError(f"{where}: {unknown_key(key, known)}")
+            meant = SYMBOLS.get(key.lower())
+            problem = f"unknown key '{key}'; did you mean {meant}?" if meant in known else unknown_key(key, known)
+            raise mpm.InputError(f"{where}: {problem}")
 
 
 def _require_member(given: Any, where: str) -> None:

@@ -4,6 +4,7 @@ import pytest
 import study_main  # noqa: F401
 from common.results import ROOT
 from common.site.file import read_site
+from common.site.keys import read_site_table
 from common.site.laws import unit_doubt, without_effect
 from common.site.rock_doubts import rock_doubt
 from mpi4py import MPI
@@ -45,9 +46,30 @@ def test_a_rock_mass_softer_than_its_samples_are_strong_is_doubted():
     assert [rock_doubt(law, "bank") for law in (*usual, mpm.LinearElastic(young=1e6, poisson=0.3))] == [""] * 5
 
 
+@pytest.mark.parametrize("symbol, key", [("GSI", "geological_strength_index"), ("m_i", "intact_constant"), ("sigma_ci", "intact_strength"),
+                                         ("D", "disturbance_factor")])  # fmt: skip
+def test_symbols_of_the_criterion_lead_to_the_keys(tmp_path, symbol, key):
+    path = tmp_path / "rock.toml"
+    path.write_text(f'extends = "{ROOT}/meshes/rock_slope.toml"\n[soils.bank]\n{symbol} = 1.0\n')
+    with pytest.raises(mpm.InputError, match=f"soils.bank: unknown key '{symbol}'; did you mean {key}\\?"):
+        read_site(path, MPI.COMM_SELF, 8.0)
+    path.write_text(f'extends = "{ROOT}/meshes/rock_slope.toml"\n[boundaries.face]\n{symbol} = 1.0\n')
+    with pytest.raises(mpm.InputError, match=f"boundaries.face: unknown key '{symbol}', expected some of head"):
+        read_site(path, MPI.COMM_SELF, 8.0)
+
+
 def test_parameters_of_soil_have_no_effect_on_rock():
     assert without_effect(ROCK | {"cohesion": 10e3, "friction_angle": 30.0, "tension_cutoff": 0.0}) == [
         "cohesion",
         "friction_angle",
     ]
     assert without_effect({"material": "mohr-coulomb", "dilation_ratio": 0.2}) == ["dilation_ratio"]
+
+
+def test_relaxation_of_a_stage_leads_to_its_deconfinement(tmp_path):
+    path = tmp_path / "tunnel.toml"
+    path.write_text(
+        f'extends = "{ROOT}/meshes/tunnel.toml"\n[[stages]]\nname = "core"\nexcavate = "core"\nrelaxation = 0.5\n'
+    )
+    with pytest.raises(mpm.InputError, match=r"stages\[0\]: unknown key 'relaxation'; did you mean deconfinement\?"):
+        read_site_table(path)
