@@ -35,8 +35,8 @@ def wrong_deconfinement(stage: Stage, where: str) -> str | None:
         whole = "prescribes displacements, only a part of which would happen"
     elif stressed is not None:
         whole = f"installs {stressed!r} with a prestress, only a part of which would act on the ground"
-    expected = "expected that in a stage of its own"
-    return f"{where}deconfinement is {given:g} in a stage that {whole}, {expected}" if whole else None
+    expected = "expected 1 there, and the deconfinement in another stage"
+    return f"{where}deconfinement is {given:g} in a stage that {whole}; {expected}" if whole else None
 
 
 def reached_by(stage: Stage, now: Load, load: Load, state: SiteState) -> Load:

@@ -193,7 +193,7 @@ def test_a_deconfinement_that_is_not_possible_is_named(pit, wrong, message):
 def test_soil_whose_weight_would_act_in_part_is_refused(pit):
     stage = bridge.Stage("in situ", fill=SOILS["pit"], unit_weight=weights(SOILS["pit"]), deconfinement=0.5)
     with pytest.raises(
-        bridge.InputError, match="deconfinement is 0.5 in a stage that fills .*'pit 1'.*a stage of its own"
+        bridge.InputError, match="deconfinement is 0.5 in a stage that fills .*'pit 1'.*expected 1 there"
     ):
         carried_out(site_of(pit, elastic(SOILS["pit"])), stage)
 
