@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-
 FURTHEST = 1e3
 """Radii of the tunnel within which ground without an end yields"""
 

@@ -53,6 +53,7 @@ from .hardening_doubts import k0_doubt
 from .interfaces import fractions_of, in_stages, split_beside, weakened, with_ratios_beside
 from .k0 import from_the_beginning, k0_of, overconsolidation_of
 from .keys import CHANGES, STAGE_WATER, changes_of, member_of, part_of, read_site_table
+from .law_doubts import DOUBTS
 from .laws import (
     HISTORY,
     OVERCONSOLIDATION,
@@ -64,7 +65,6 @@ from .laws import (
     unit_doubt,
     unit_weight_of,
 )
-from .law_doubts import DOUBTS
 from .member_doubts import warn_of_pulling_struts
 from .mesh import check_soils, geometry_of, site_mesh
 from .names import mistakes_in, require_soils

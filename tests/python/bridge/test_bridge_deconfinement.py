@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from dolfinx.mesh import compute_midpoints, meshtags
 from mpi4py import MPI
-from stage_cases import IN_SITU, ROLLERS, SOILS, carried_out, elastic, mesh_of, oedometer, site_of, weights
+from stage_cases import IN_SITU, ROLLERS, SOILS, carried_out, elastic, oedometer, site_of, weights
 
 import fenics_bridge as bridge
 import mpm_core as mpm
@@ -18,16 +18,6 @@ sys.path.insert(0, str(Path(__file__).parents[3] / "studies" / "verification"))
 from _ground_reaction import Ground  # noqa: E402
 
 GROUND = Ground(3.0, 60.0, 200e3, young=50e6, poisson=0.3, cohesion=30e3, friction_angle=20.0, dilation_angle=10.0)
-
-
-@pytest.fixture(scope="module")
-def pit(tmp_path_factory):
-    return mesh_of("pit", tmp_path_factory.mktemp("pit"))
-
-
-@pytest.fixture(scope="module")
-def column(tmp_path_factory):
-    return mesh_of("column", tmp_path_factory.mktemp("column"))
 
 
 @pytest.fixture(scope="module")

@@ -21,16 +21,6 @@ import fenics_bridge as bridge
 import mpm_core as mpm
 
 
-@pytest.fixture(scope="module")
-def pit(tmp_path_factory):
-    return mesh_of("pit", tmp_path_factory.mktemp("pit"))
-
-
-@pytest.fixture(scope="module")
-def column(tmp_path_factory):
-    return mesh_of("column", tmp_path_factory.mktemp("column"))
-
-
 def there_of(points):
     """Stress of the points that are there, and their depths below the surface of the column's ground."""
     there = np.repeat(points.material >= 0, points.per_cell)

@@ -2,20 +2,10 @@
 
 import numpy as np
 import pytest
-from stage_cases import DIG, IN_SITU, ROLLERS, SOILS, carried_out, elastic, mesh_of, site_of
+from stage_cases import DIG, IN_SITU, ROLLERS, SOILS, carried_out, elastic, site_of
 
 import fenics_bridge as bridge
 import mpm_core as mpm
-
-
-@pytest.fixture(scope="module")
-def pit(tmp_path_factory):
-    return mesh_of("pit", tmp_path_factory.mktemp("pit"))
-
-
-@pytest.fixture(scope="module")
-def column(tmp_path_factory):
-    return mesh_of("column", tmp_path_factory.mktemp("column"))
 
 
 @pytest.mark.parametrize(

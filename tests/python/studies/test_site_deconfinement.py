@@ -6,10 +6,10 @@ from pathlib import Path
 import excavation
 import numpy as np
 import pytest
-from common.site.file import read_site
-from common.stages.runs import carry_out
 from common.field_plots import Field
+from common.site.file import read_site
 from common.stages.plots import StagePicture
+from common.stages.runs import carry_out
 from common.stages.surface import surface_picture, surface_rows
 from mpi4py import MPI
 from study_main import ended
