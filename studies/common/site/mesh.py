@@ -95,15 +95,16 @@ def check_soils(table: dict, path: Path, cell_tags: Any) -> None:
     """Compare the soils of a site with the groups of its mesh: warns of groups without a soil, whose cells hold none.
 
     Raises:
-        InputError: a soil that the mesh does not have.
+        InputError: a soil, or a group of `air`, that the mesh does not have.
     """
     names = list(bridge.names_of(cell_tags))
-    for soil in table["soils"]:
-        if soil not in names:
+    air = names_at(table, "air", str(path), "groups of the mesh")
+    for name, where in [*((soil, f"soils.{soil}") for soil in table["soils"]), *((name, "air") for name in air)]:
+        if name not in names:
             raise mpm.InputError(
-                f"{path}: soils.{soil}: no cell has the name {soil!r}; the mesh has {', '.join(map(repr, names))}"
+                f"{path}: {where}: no cell has the name {name!r}; the mesh has {', '.join(map(repr, names))}"
             )
-    named = {*table["soils"], *AIR, *names_at(table, "air", str(path), "groups of the mesh")}
+    named = {*table["soils"], *AIR, *air}
     left = [name for name in bridge.names_of(cell_tags) if name not in named]
     if left:
         groups = ", ".join(map(repr, left))

@@ -60,6 +60,7 @@ def test_a_site_may_be_a_half_section(tmp_path):
         ("top = 2.0", "bottom = 2.0", "soils.lower: shear_strength is .* expected {value = , per_metre = , top = }"),
         ('mesh = "block.geo"', "", "has no 'mesh'"),
         ("[soils.upper]", "[soils.sand]", "soils.sand: no cell has the name 'sand'; the mesh has "),
+        ('mesh = "block.geo"', 'mesh = "block.geo"\nair = ["pond"]', "air: no cell has the name 'pond'; the mesh has "),
         ('"tresca"', '"clay"', "soils.lower: material is 'clay', expected one of"),
         ("cell_size = 0.5", "cell_size = 0.5\nsize = 1", "unknown key 'size'"),
         (
