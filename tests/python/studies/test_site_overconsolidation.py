@@ -125,12 +125,11 @@ def test_a_fill_settles_overconsolidated_ground_by_less(tmp_path):
 
 def test_particles_of_a_slide_take_it_over(tmp_path):
     """In the study slope, in which all soils are there at once."""
-    from common.site.slides import _carry_weight
+    from common.site.slides import _carried
 
     path = site_in(tmp_path, SITE)
     site = read_site(path, COMM)
-    fem = site.finite_elements(1, solver=bridge.Solver(tolerance=1e-10))
-    _carry_weight(site, fem, path)
+    fem = _carried(site, path, averaged=False)
     model = site.particles(3)
     bridge.initialise(model, fem, count_displacement=False, nmd=False)
     p = model.particles

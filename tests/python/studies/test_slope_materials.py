@@ -17,7 +17,15 @@ import mpm_core as mpm
 slope = importlib.import_module("slope")
 
 SMALL = "--cell-size 0.25 --crest 1 --particles-per-cell 3 --nmd".split()
-WITHOUT_COHESION = {"cam-clay", "nor-sand", "sanisand", "undrained NorSand", "elastic", "undrained Cam-Clay"}
+WITHOUT_COHESION = {
+    "cam-clay",
+    "nor-sand",
+    "sanisand",
+    "hoek-brown",
+    "undrained NorSand",
+    "elastic",
+    "undrained Cam-Clay",
+}
 OTHERS = {
     "finite strain": ["--finite-strain"],
     "undrained": ["--undrained", "--water-modulus", "1e6"],
