@@ -254,7 +254,7 @@ def solved_fem(case: SlopeCase, unit_weight: float, nmd: bool = False) -> bridge
         radians = angles_in_radians(fem.laws)
         raise mpm.InputError(
             f"--initial-unit-weight is {unit_weight:g} N/m3, which the slope does not carry: the finite elements found no equilibrium "
-            f"above {fem.load.unit_weight:.5g} N/m3; lower --initial-unit-weight, or raise --cohesion or --friction-angle"
+            f"above {fem.load.unit_weight:.5g} N/m3; lower --initial-unit-weight, or give the soil more strength"
             + (f". Note that {radians}" if radians else "")
         )
     return fem
