@@ -73,12 +73,13 @@ def test_no_line_of_a_page_begins_with_a_per_cent_sign(page):
 
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "toml")], ids=name)
 def test_toml_blocks_are_parameters_of_the_study_that_the_page_runs_with_them(page, tmp_path, capsys):
+    for shipped in (ROOT / "meshes").iterdir():  # files of sites that a block extends
+        (tmp_path / shipped.name).symlink_to(shipped)
     for block in blocks(page, "toml"):
         file = tmp_path / re.match(r"# (\w+\.toml)", block).group(1)
+        assert not file.exists(), f"a file of this name is shipped, or is on the page twice: {file.name}"
         file.write_text(block)
-        if "extends" in block:  # the file of a site, beside those that are shipped
-            for shipped in (ROOT / "meshes").iterdir():
-                (tmp_path / shipped.name).symlink_to(shipped)
+        if "extends" in block:
             importlib.import_module("common.site.keys").read_site_table(file)
             continue
         study = re.search(rf"studies/run (\w+) --parameters {file.name}", page.read_text()).group(1)
