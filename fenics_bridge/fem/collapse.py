@@ -220,7 +220,7 @@ def _follow(
     agree(
         comm,
         None
-        if len(curve) > 1
+        if len(curve) > 1 or start > 0
         else f"first_step: no equilibrium was found above {start!r}, {last.report.reason}; take a smaller one",
     )
     largest = _largest(mechanism, comm, dim)
@@ -255,11 +255,11 @@ def _unlimited(steps: list[LoadStep], curve: Any, mechanism: Any) -> Collapse:
 
 
 def _accepted(steps: list[LoadStep]) -> Any:
-    """States that were accepted as equilibrium on the way."""
+    """States that were accepted as equilibrium on the way; not a number where there was none beyond the start."""
     reports = [step.report for step in steps if step.converged]
     return {
-        "residual": max(report.residuals[-1] for report in reports),
-        "missing": max(report.missing for report in reports),
+        "residual": max((report.residuals[-1] for report in reports), default=math.nan),
+        "missing": max((report.missing for report in reports), default=math.nan),
     }
 
 

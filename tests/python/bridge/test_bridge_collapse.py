@@ -128,6 +128,14 @@ def test_a_start_that_is_too_large_is_halved():
     assert found.value == pytest.approx(bridge.factor_of_safety(slope_model(), weight(80e3), start=0.3).value, rel=5e-3)
 
 
+def test_a_start_just_below_the_factor_is_the_factor():
+    """No step beyond it finds an equilibrium; it was an error that advised a smaller first step."""
+    model, load = slope_model(), weight(20e3)
+    factor = bridge.factor_of_safety(model, load, tolerance=1e-3).value
+    found = bridge.factor_of_safety(slope_model(), load, start=0.985 * factor, tolerance=0.04)
+    assert found.value == 0.985 * factor and found.failed and factor < found.failed_at <= 1.08 * factor
+
+
 def test_more_strength_is_not_advised_where_it_would_not_help():
     model = slope_model()
     model.law = mpm.MohrCoulomb(young=YOUNG, poisson=POISSON, cohesion=0.0, friction_angle=0.0)
