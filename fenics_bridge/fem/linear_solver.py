@@ -46,6 +46,19 @@ FACTORISING = ("lu", "cholesky", "telescope", "redundant")
 """PETSc's preconditioners that factorise the matrix"""
 
 
+def _factorised_by_default(space: Any, averaged: bool, reinforced: bool) -> bool:
+    """Whether systems on a space are factorised unless PETSc options say otherwise; see `LinearSolver` for the arguments."""
+    index_map, dim = space.dofmap.index_map, space.mesh.geometry.dim
+    limit = AVERAGED_LIMIT if averaged and dim == 3 and not reinforced else DIRECT_LIMIT[dim]
+    return bool(space.dofmap.index_map_bs != dim or index_map.size_global <= limit)
+
+
+def factorises(space: Any, options_prefix: str, averaged: bool, reinforced: bool) -> bool:
+    """Whether a `LinearSolver` would factorise systems, by default or by the user's PETSc options; see there for the arguments."""
+    chosen = PETSc.Options(options_prefix).getString("pc_type", "")
+    return chosen in FACTORISING if chosen else _factorised_by_default(space, averaged, reinforced)
+
+
 class LinearSolver:
     """Solution of linear systems on a space by PETSc.
 
@@ -72,8 +85,7 @@ class LinearSolver:
         self._n_owned = index_map.size_local * bs
         displacements = bs == dim
         alone = index_map.size_global <= ALONE_LIMIT[dim]
-        limit = AVERAGED_LIMIT if averaged and dim == 3 and not reinforced else DIRECT_LIMIT[dim]
-        direct = not displacements or index_map.size_global <= limit
+        direct = _factorised_by_default(space, averaged, reinforced)
         self._factorising = direct_options(self._comm.size, alone, pivoting=not displacements)
         self._may_factorise = reinforced and not direct and index_map.size_global <= FALLBACK_LIMIT
         self._options = self._factorising if direct else multigrid_options(dim, EXACT)

@@ -26,6 +26,7 @@ from fenics_bridge.fem.failure import explained, warn_of_motion
 from fenics_bridge.fem.fields import SupportedBody, nodal_average
 from fenics_bridge.fem.geometry import geometry_of, radius_of, require_axis_held
 from fenics_bridge.fem.kinematics import Kinematics
+from fenics_bridge.fem.linear_solver import LinearSolver
 from fenics_bridge.fem.load_steps import LoadStep, raise_load
 from fenics_bridge.fem.loads import Load, LoadVectors, warn_of_weight
 from fenics_bridge.fem.locking import warn_of_laws
@@ -146,9 +147,10 @@ class QuasiStatic(ReinforcedBody, WetBody, SupportedBody, PointFunctions):
 
     def _assemble(self, constraints: Constraints, reinforced: bool = False) -> None:
         """The Body that a step changes, with the given constraints; reinforced: whether it has members. Collective."""
-        require_axis_held(self.displacement.function_space, self.geometry, constraints)
+        space = self.displacement.function_space
+        require_axis_held(space, self.geometry, constraints)
         parts = self.increment, self.points, constraints
-        linear = self._linear_solver(reinforced)
+        linear = LinearSolver(space, self._options_prefix, newton=True, averaged=self._nmd, reinforced=reinforced)
         self._kinematics: Any = (
             AveragedKinematics(*parts, self.laws, self.geometry, self._as_particles, linear.direct)
             if self._nmd

@@ -9,7 +9,7 @@ from mpm_core.members import Member, MemberForces
 from mpm_core.petsc import DIRECT_LIMIT
 
 from fenics_bridge.errors import agree
-from fenics_bridge.fem.linear_solver import LinearSolver
+from fenics_bridge.fem.linear_solver import factorises
 from fenics_bridge.structures.installed import Members
 from fenics_bridge.structures.member_warnings import warn_of_members
 
@@ -71,14 +71,10 @@ class ReinforcedBody:
         agree(comm, wrong and f"{where}members: {wrong}")
         return self._members.prepared(members, active, where)
 
-    def _linear_solver(self, reinforced: bool) -> LinearSolver:
-        """A new solver of linear systems, of a body of displacements with or without members. Collective."""
-        return LinearSolver(self.displacement.function_space, self._options_prefix, True, self._nmd, reinforced)
-
     def _keeps_factors(self) -> bool:
-        """Whether the stiffness stays in factors, to which that of members cannot be added, also where there are some. Collective."""
+        """Whether the stiffness stays in factors, to which that of members cannot be added, also where there are some."""
         factored = getattr(self._body.kinematics, "factored", False)
-        return factored and not self._linear_solver(reinforced=True).direct
+        return factored and not factorises(self.displacement.function_space, self._options_prefix, self._nmd, True)
 
     def _change_members(self, prepared: Any) -> None:
         """Install, keep and remove members that were prepared. Collective."""
