@@ -71,20 +71,21 @@ class MembersOverTime:
         """Each beam at the frames, and the largest axial forces and moments over time.
 
         Args:
-            history: of the study; logarithmic: scale of the time, which has no beginning.
+            history: of the study; logarithmic: scale of the time.
             stages: days at which further stages begin.
         """
         if not self._members:
             return {}
         drawn = {name: one for name, one in member_pictures(self.frames, folder).items() if name != "axial_forces"}
         beams = [name for name, member in self._members.items() if member.bending_stiffness]
+        since = 1 if logarithmic else 0  # the logarithm of time has no beginning
         for file, label, column, names in (
             ("axial_forces", "Largest axial force [kN/m]", axial_column, list(self._members)),
             ("moments", "Largest moment [kN m/m]", moment_column, beams),
         ):
-            curves = {name: 1e-3 * history[column(name)][logarithmic:] for name in names}
+            curves = {name: 1e-3 * history[column(name)][since:] for name in names}
             if names:
-                path, days = folder / f"{file}.png", history["time_days"][logarithmic:]
+                path, days = folder / f"{file}.png", history["time_days"][since:]
                 drawn[file] = lambda path=path, days=days, curves=curves, label=label: save_over_time(
                     path, days, curves, label, stages=stages, logarithmic=logarithmic
                 )
